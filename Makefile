@@ -97,7 +97,7 @@ install-core: setup-core
 hosts: setup
 	$(BUILD)
 	./tools/install "$(CURDIR)/target/install"
-	cmake -S tests/ctest -B target/ctest -DCMAKE_PREFIX_PATH="$(CURDIR)/target/install" >/dev/null
+	cmake -S tests/ctest/full -B target/ctest -DCMAKE_PREFIX_PATH="$(CURDIR)/target/install" >/dev/null
 	cmake --build target/ctest --parallel $(shell nproc) >/dev/null
 
 test-hosts: hosts
@@ -111,7 +111,7 @@ hosts-core: setup
 	$(CORE)
 	rm -rf target/core/install
 	./tools/install-core "$(CURDIR)/target/core/install"
-	cmake -S tests/ctest_core -B target/core/ctest -DCMAKE_PREFIX_PATH="$(CURDIR)/target/core/install" >/dev/null
+	cmake -S tests/ctest/core -B target/core/ctest -DCMAKE_PREFIX_PATH="$(CURDIR)/target/core/install" >/dev/null
 	cmake --build target/core/ctest --parallel $(shell nproc) >/dev/null
 
 test-core: hosts-core
@@ -170,7 +170,7 @@ pictures: setup
 
 # make gates [ONLY=snow.base.wall,...]
 gates: setup hosts hosts-core
-	@cargo bench --quiet --bench gates -- $(ONLY)
+	@cargo bench --quiet --bench gates -- $(ONLY) && status=0 || status=$$?; ./tools/plots target/plots && exit $$status
 
 # Times and errors beside the thesis', stock OpenVDB's and other methods': make bench [ONLY=snow,surface,shallow]
 bench: setup

@@ -10,6 +10,9 @@ mod edit_history;
 mod harness;
 #[path = "times/matching.rs"]
 mod matching;
+#[path = "gates/process.rs"]
+#[allow(dead_code)]
+mod process;
 #[path = "times/projections.rs"]
 mod projections;
 #[path = "times/rebuilding.rs"]

@@ -56,7 +56,7 @@
 /**
  * Minor version of frazil.
  */
-#define FRZ_VERSION_MINOR 1
+#define FRZ_VERSION_MINOR 2
 
 /**
  * Patch version of frazil.

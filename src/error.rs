@@ -76,6 +76,19 @@ impl Error {
     pub fn argument(what: impl Into<String>) -> Self {
         Self::Argument(what.into())
     }
+
+    /// An error about an argument that comes from a file, as one about the file; other errors stay as they are.
+    pub fn in_file(self, path: impl AsRef<Path>) -> Self {
+        self.in_file_at(path, "")
+    }
+
+    /// As [`Error::in_file`], with the text `at` before the sentence: which part of the file it is about.
+    pub fn in_file_at(self, path: impl AsRef<Path>, at: impl std::fmt::Display) -> Self {
+        match self {
+            Self::Argument(what) => Self::file(path, format!("{at}{what}")),
+            other => other,
+        }
+    }
 }
 
 /// Letters of a text from outside that a message repeats.

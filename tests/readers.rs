@@ -12,10 +12,9 @@ use std::io::BufReader;
 use std::path::Path;
 use std::process::Command;
 
-use program::CUBE;
+use program::{CUBE, Folder};
 use serde_json::Value;
 use skip::skipped;
-use tempfile::TempDir;
 use vdb_rs::{Map, MetadataValue, VdbReader};
 
 const SCENE: &str = "[shot]\nframes = \"1-3\"\n[snow]\nground = 0.0\narea = [-0.5, -0.5, 0.5, 1.5]\ndepth = 0.3\n\
@@ -39,13 +38,12 @@ fn this_program_does_not_link_ours() {
 }
 
 /// A folder with three frames of prints, and what the command says of the last.
-fn frames() -> (TempDir, Vec<Value>) {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
-    std::fs::write(folder.path().join("shot.toml"), SCENE).unwrap();
-    frazil(folder.path(), &["snow", "shot.toml", "-o", "out", "-q"]);
-    let info =
-        frazil(folder.path(), &["info", "out/base/base.0003.vdb", "out/removed/removed.0003.vdb", "--json"]);
+fn frames() -> (Folder, Vec<Value>) {
+    let folder = Folder::empty();
+    std::fs::write(folder.join("cube.obj"), CUBE).unwrap();
+    std::fs::write(folder.join("shot.toml"), SCENE).unwrap();
+    frazil(&folder, &["snow", "shot.toml", "-o", "out", "-q"]);
+    let info = frazil(&folder, &["info", "out/base/base.0003.vdb", "out/removed/removed.0003.vdb", "--json"]);
     let info: Value = serde_json::from_str(&info).unwrap();
     let grids = info.as_array().unwrap().iter().flat_map(|file| file["holds"].as_array().unwrap().clone());
     let grids = grids.collect();
@@ -62,7 +60,7 @@ fn vdb_rs_sees_the_same_grids() {
     assert_eq!(grids.len(), 4);
     for info in grids {
         let name = info["name"].as_str().unwrap();
-        let file = BufReader::new(File::open(folder.path().join(file_of(&info))).unwrap());
+        let file = BufReader::new(File::open(folder.join(file_of(&info))).unwrap());
         let grid = VdbReader::new(file).unwrap().read_grid::<f32>(name).unwrap();
         let active: f64 = grid.iter().map(|(_, _, level)| f64::from(level.scale()).powi(3)).sum();
         assert_eq!(Some(active), info["active_voxels"].as_f64(), "{name}");
@@ -131,9 +129,9 @@ fn vdb_print_is_content() {
 /// Kernels are compiled for several sets of instructions: all of them give the same bytes.
 #[test]
 fn every_set_of_instructions_gives_the_same_bytes() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
-    std::fs::write(folder.path().join("shot.toml"), SCENE).unwrap();
+    let folder = Folder::empty();
+    std::fs::write(folder.join("cube.obj"), CUBE).unwrap();
+    std::fs::write(folder.join("shot.toml"), SCENE).unwrap();
     let run = |level: &str| {
         let output = Command::new(assert_cmd::cargo::cargo_bin("frazil"))
             .current_dir(folder.path())
@@ -142,7 +140,7 @@ fn every_set_of_instructions_gives_the_same_bytes() {
             .output()
             .unwrap();
         assert!(output.status.success());
-        let read = |name: &str| std::fs::read(folder.path().join(level).join(name)).unwrap();
+        let read = |name: &str| std::fs::read(folder.join(level).join(name)).unwrap();
         ["base/base.0003.vdb", "removed/removed.0002.vdb"].map(read)
     };
     let baseline = run("baseline");

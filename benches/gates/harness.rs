@@ -115,6 +115,31 @@ impl Harness {
         println!("gate {name} skipped # {reason}");
     }
 
+    /// Measures a gate if it is wanted: its value, or a yes or no, and a note.
+    pub fn measure<V: Into<f64>, N: AsRef<str>>(&mut self, name: &str, measure: impl FnOnce() -> (V, N)) {
+        if self.wants(name) {
+            let (value, note) = measure();
+            self.gate(name, value.into(), note.as_ref());
+        }
+    }
+
+    /// Measures gates together if any of them is wanted, and prints those that are.
+    pub fn measure_all<N: AsRef<str>, const COUNT: usize>(
+        &mut self,
+        names: [&str; COUNT],
+        measure: impl FnOnce() -> [(f64, N); COUNT],
+    ) {
+        let wanted = names.map(|name| self.wants(name));
+        if wanted == [false; COUNT] {
+            return;
+        }
+        for ((name, is_wanted), (value, note)) in names.into_iter().zip(wanted).zip(measure()) {
+            if is_wanted {
+                self.gate(name, value, note.as_ref());
+            }
+        }
+    }
+
     /// Prints a gate.
     ///
     /// # Panics

@@ -3,11 +3,10 @@
 mod capi;
 #[path = "../../tests/common/mod.rs"]
 mod common;
-mod files;
 #[path = "harness.rs"]
 mod harness;
-mod house;
 mod plots;
+mod process;
 mod reliability;
 mod scenes;
 mod shallow;
@@ -18,47 +17,48 @@ mod worst;
 
 use harness::Harness;
 
+/// What runs of this program do for a word; others measure them.
+const RUNS: [(&str, fn()); 8] = [
+    ("peak-of-large", snow::speed::print_peak),
+    ("hash-of-small", snow::bytes::print_hash),
+    ("memory-of-grains", snow::grains::memory::print_memory),
+    ("memory-of-mist", snow::mist::print_memory),
+    ("rebuilt-million", surface::rebuilt_large::print_million),
+    ("read-mutated", reliability::damage::read_mutated),
+    ("hash-of-shallow", shallow::same_bytes::print_hash),
+    ("hash-of-surfaces", shallow::same_bytes::print_surfaces),
+];
+
 fn main() {
-    let first = std::env::args().nth(1);
-    match first.as_deref() {
-        Some(snow::speed::PEAK) => return snow::speed::print_peak(),
-        Some(snow::bytes::HASH) => return snow::bytes::print_hash(),
-        Some(snow::grains::memory::MEMORY) => return snow::grains::memory::print_memory(),
-        Some(snow::mist::MEMORY) => return snow::mist::print_memory(),
-        Some(surface::rebuilt_large::MILLION) => return surface::rebuilt_large::print_million(),
-        Some(files::damage::FUZZ) => return files::damage::read_mutated(),
-        Some(shallow::same_bytes::HASH) => return shallow::same_bytes::print_hash(),
-        Some(shallow::same_bytes::SURFACES) => return shallow::same_bytes::print_surfaces(),
-        _ => {}
+    if let Some((_, run)) = RUNS.iter().find(|(word, _)| std::env::args().nth(1).as_deref() == Some(word)) {
+        return run();
     }
     let mut h = Harness::from_arguments();
     sweep::walls::run(&mut h);
     snow::base_layer::run(&mut h);
     snow::speed::run(&mut h);
     snow::bytes::run(&mut h);
-    files::readers::run(&mut h);
     snow::grains::run(&mut h);
-    snow::plates::run(&mut h);
+    h.measure("snow.base.plates", snow::plates::measure);
     snow::mist::run(&mut h);
-    snow::mist::frame_rate::run(&mut h);
-    snow::mist::eddies::run(&mut h);
+    h.measure("snow.mist.frame_rate", snow::mist::frame_rate::measure);
+    h.measure("snow.mist.turbulence_decorrelates", snow::mist::eddies::measure);
     snow::mist::walls::run(&mut h);
     snow::mist::passes::run(&mut h);
     snow::mist::cancel::run(&mut h);
     snow::shot::run(&mut h);
     snow::volumes::run(&mut h);
     capi::calls::run(&mut h);
-    capi::cancel::run(&mut h);
-    reliability::guard_page::run(&mut h);
+    h.measure_all(["reliability.cancel_reset", "reliability.cancel_reset_changed"], capi::cancel::measure);
     reliability::step_calls::run(&mut h);
-    snow::damaged_folder::run(&mut h);
+    h.measure_all(["reliability.flip_wrong", "reliability.flip_unnamed"], snow::damaged_folder::measure);
     snow::far::run(&mut h);
     sweep::band::run(&mut h);
     sweep::spin::run(&mut h);
-    files::damage::run(&mut h);
-    reliability::empty_frames::run(&mut h);
+    reliability::damage::run(&mut h);
+    h.measure("reliability.empty_frames", reliability::empty_frames::measure);
     surface::known_motion::run(&mut h);
-    surface::first_flag::run(&mut h);
+    h.measure("surface.early", surface::first_flag::measure);
     surface::vortex::run(&mut h);
     surface::readers::run(&mut h);
     surface::large::run(&mut h);
@@ -66,30 +66,33 @@ fn main() {
     surface::splashsurf::run(&mut h);
     surface::cancel::run(&mut h);
     surface::repair::run(&mut h);
-    reliability::soup::run(&mut h);
+    h.measure_all(["reliability.soup_silent", "reliability.soup_warned"], reliability::soup::measure);
     surface::rebuilt::run(&mut h);
     surface::rebuilt_topology::run(&mut h);
-    surface::textures::run(&mut h);
+    h.measure("surface.textures", surface::textures::measure);
     surface::rebuilt_speed::run(&mut h);
     surface::rebuilt_frames::run(&mut h);
     surface::rebuilt_large::run(&mut h);
     surface::matching::run(&mut h);
     shallow::core::run(&mut h);
     shallow::film::run(&mut h);
-    shallow::delivery::run(&mut h);
-    shallow::orifice::run(&mut h);
-    shallow::huppert::run(&mut h);
+    h.measure("shallow.delivery", shallow::delivery::measure);
+    h.measure("shallow.orifice", shallow::orifice::measure);
+    let names = ["exponent", "exponent_coarse", "front", "front_coarse"]
+        .map(|name| format!("shallow.huppert_{name}"));
+    h.measure_all(names.each_ref().map(String::as_str), shallow::huppert::measure);
     shallow::incline::run(&mut h);
     shallow::walls::run(&mut h);
-    shallow::spread::run(&mut h);
-    shallow::bowl::run(&mut h);
-    shallow::energy::run(&mut h);
+    h.measure_all(["shallow.spread_exponent", "shallow.spread_round"], shallow::spread::measure);
+    h.measure("shallow.bowl_period", shallow::bowl::measure);
+    let names = ["shallow.energy_start", "shallow.energy_high", "shallow.energy_viscous"];
+    h.measure_all(names, shallow::energy::measure);
     shallow::lake::run(&mut h);
     shallow::minimum_heights::run(&mut h);
-    shallow::dam::run(&mut h);
-    shallow::mass::run(&mut h);
+    h.measure_all(["shallow.dam_front", "shallow.dam_depth"], shallow::dam::measure);
+    h.measure("shallow.mass", shallow::mass::measure);
     shallow::free_fall::run(&mut h);
-    shallow::range::run(&mut h);
+    h.measure("shallow.depth_range", shallow::range::measure);
     shallow::scalars::run(&mut h);
     shallow::same_bytes::run(&mut h);
     shallow::speed::run(&mut h);
@@ -103,10 +106,8 @@ fn main() {
     shallow::threads::run(&mut h);
     surface::easing::run(&mut h);
     reliability::bugs::run(&mut h);
-    reliability::gltf_valid::run(&mut h);
     reliability::orientation::run(&mut h);
     surface::rest_kept::run(&mut h);
     surface::detail_kept::run(&mut h);
-    house::run(&mut h);
     h.finish();
 }

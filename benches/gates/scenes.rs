@@ -1,11 +1,29 @@
 //! Layers and bodies of the gates.
 
+use std::path::PathBuf;
+
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Key, Keys, Rigid};
-use frazil::snow::base_layer::initial::{Cover, Ground, layer};
+use frazil::snow::base_layer::initial::{self, Cover, Ground};
 use frazil::snow::base_layer::{BaseLayer, Params};
 use frazil::sweep::Body;
 use frazil::{Context, Pool};
+
+use crate::common::character::data;
+use crate::harness::Harness;
+
+/// The character of most gates, in the outside data.
+pub const MAN: &str = "character/CesiumMan.glb";
+
+/// A file of the outside data, where one of these gates is wanted; without the file they are skipped.
+pub fn wanted_data(h: &mut Harness, names: &[&str], file: &str) -> Option<PathBuf> {
+    let wanted: Vec<&str> = names.iter().copied().filter(|name| h.wants(name)).collect();
+    let found = data(file);
+    if found.is_none() {
+        wanted.iter().for_each(|name| h.skipped(name, "no data"));
+    }
+    found.filter(|_| !wanted.is_empty())
+}
 
 /// A context on so many threads.
 pub fn context(threads: usize) -> Context {
@@ -20,9 +38,14 @@ pub fn snow(ctx: &Context, edge: f64, cell: f64, params: Params) -> BaseLayer {
 /// Snow on the ground at a height (m).
 fn snow_on(ctx: &Context, height: f64, edge: f64, cell: f64, params: Params) -> BaseLayer {
     let half = edge / 2.0;
-    let ground = Ground::Plane { height, area: [-half, -half, half, half] };
-    let layer = layer(ctx, &ground, &[], &Cover::Depth(0.3), cell, 3.0).expect("snow");
-    BaseLayer::new(ctx, layer, params).expect("base layer")
+    layer(ctx, height, [-half, -half, half, half], 0.3, cell, params)
+}
+
+/// Snow of a depth on level ground: a height, an area, the depth and the edge of a cell (m).
+pub fn layer(ctx: &Context, height: f64, area: [f64; 4], depth: f64, cell: f64, params: Params) -> BaseLayer {
+    let ground = Ground::Plane { height, area };
+    let snow = initial::layer(ctx, &ground, &[], &Cover::Depth(depth), cell, 3.0).expect("snow");
+    BaseLayer::new(ctx, snow, params).expect("base layer")
 }
 
 /// A body that moves in a straight line, turning at a constant rate; times in frames.
@@ -60,14 +83,14 @@ pub const WALK_CELL: f64 = 0.0075;
 /// No noise.
 pub const EXACT: Params = Params { noise: None, tolerance: 0.02 };
 
-/// The boots of the demonstration's walk and their keys, frames 1 to 48.
-pub fn boots() -> [(TriMesh, Keys); 2] {
+/// The boots of the demonstration's walk and their keys, frames 1 to 48, moved by so much (m).
+pub fn boots(by: DVec3) -> [(TriMesh, Keys); 2] {
     use crate::common::boot::{left_boot, right_boot};
     use crate::common::walk::walk;
     let keys = |side: f64| {
         let keys = walk(side, 48, 0.08).into_iter().map(|step| Key {
             time: f64::from(step.frame),
-            at: DVec3::from(step.at) - DVec3::z() * 1.5,
+            at: DVec3::from(step.at) + (by - DVec3::z() * 1.5),
             turn: DVec3::from(step.turn_deg.map(f64::to_radians)),
         });
         Keys::new(keys.collect()).expect("keys")
@@ -77,6 +100,11 @@ pub fn boots() -> [(TriMesh, Keys); 2] {
 
 /// The boots as bodies.
 pub fn walkers() -> Vec<Body> {
+    walkers_at(DVec3::zeros())
+}
+
+/// The boots as bodies, moved by so much (m).
+pub fn walkers_at(by: DVec3) -> Vec<Body> {
     let body = |(mesh, keys)| Body::new(Box::new(Rigid::new(mesh, keys)), 1.0).expect("body");
-    boots().map(body).into()
+    boots(by).map(body).into()
 }

@@ -9,7 +9,7 @@ use frazil::geometry::mesh::coincident;
 use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::surface::{Distances, Implicit, Isosurface, Params, Particles, Tracker, Weighting, carried};
 
-use crate::common::liquids::{Ball, ball, context, follow, numbered, once_around};
+use crate::common::liquids::{Ball, ball, context, follow, numbered, once_around, surface_on};
 use crate::common::nearest::distances;
 use crate::common::spot;
 use crate::harness::median;
@@ -203,8 +203,7 @@ fn tracked(ctx: &Context, frames: &[Particles], cell: f64) -> String {
 
 /// The surface of particles of a spacing (m), on cells finer than those that meshes follow it on.
 fn truth(ctx: &Context, particles: &Particles, spacing: f64) -> TriMesh {
-    let phi = Implicit::new(ctx, &particles.positions, spacing, 0.25 * spacing).expect("a surface");
-    Isosurface::new(&phi).mesh(&phi)
+    surface_on(ctx, &particles.positions, spacing, 0.25)
 }
 
 /// How far vertices that are kept are from their distance to a surface (r).

@@ -501,7 +501,7 @@ library = _load()
 
 
 def version():
-    """The library's version, for instance (0, 1, 0)."""
+    """The library's version, for instance (0, 2, 0)."""
     number = library.frz_version()
     return number // 1000000, number // 1000 % 1000, number % 1000
 

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use serde_json::json;
 
 use super::each::Each;
-use super::options::{Axis, MeshSpace, positive, warn_if_far};
+use super::options::{
+    Axis, MeshSpace, needs_frames, of_frame, one_frame, positive, refuse_one_file, warn_if_far,
+};
 use super::session::Session;
 use super::session::exit::{Failure, Phase};
 use super::{output, points};
@@ -19,7 +21,7 @@ use frazil::io::mesh::extension;
 use frazil::io::usd;
 use frazil::io::usd::points::VELOCITIES;
 use frazil::motion::{Character, Keys, MeshSequence, Motion, Placed, Play, Rigid, is_gltf, missing_uvs};
-use frazil::scene::{FrameChoice, Frames};
+use frazil::scene::FrameChoice;
 
 /// Convert meshes, sequences of meshes, characters and points to other files.
 ///
@@ -72,24 +74,18 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     check_output(&args.output)?;
     let (mut source, frames) = args.source()?;
-    let pattern = Pattern::parse(&args.output);
-    if pattern.is_none() && frames.count() > 1 {
-        let what = format!("{}: several frames need a pattern such as hero.%04d.ply", args.output.display());
-        return Err(Failure::refused(what));
-    }
+    refuse_one_file(&args.output, &frames, "hero.%04d.ply")?;
     output::check_writable(&args.output).before()?;
-    let input = Pattern::parse(&args.input);
     for frame in frames.iter() {
         // The frame after the last is read for velocities.
-        let read = |frame| input.as_ref().map_or_else(|| args.input.clone(), |input| input.path(frame));
-        let path = pattern.as_ref().map_or_else(|| args.output.clone(), |pattern| pattern.path(frame));
-        let inputs = [read(frame), read(frame.saturating_add(1))];
+        let inputs = [frame, frame.saturating_add(1)].map(|frame| of_frame(&args.input, frame));
+        let path = of_frame(&args.output, frame);
         output::refuse_input(&path, inputs.iter().map(PathBuf::as_path)).before()?;
     }
     let (mut each, mut made, mut triangles, mut has_warned) = (Each::default(), 0, 0, false);
     for frame in frames.iter() {
         session.ctx.check().during()?;
-        let path = pattern.as_ref().map_or_else(|| args.output.clone(), |pattern| pattern.path(frame));
+        let path = of_frame(&args.output, frame);
         let done = source.write(args, &path, frame, &mut has_warned);
         if let Some(count) = each.take(frame, done)? {
             (made, triangles) = (made + 1, count);
@@ -159,7 +155,43 @@ pub fn check_output(path: &Path) -> Result<(), Failure> {
     if extension == "usda" || io::mesh::EXTENSIONS.contains(&extension.as_str()) {
         return Ok(());
     }
-    Err(Failure::refused(format!("{}: the output must be a .obj, .ply, .stl or .usda file", path.display())))
+    Err(Failure::of_file(path, "the output must be a .obj, .ply, .stl or .usda file"))
+}
+
+/// A file to be written with one mesh.
+pub struct MeshFile<'a> {
+    pub path: &'a Path,
+    /// Name of the mesh in USD.
+    pub name: &'a str,
+    pub frame: i32,
+    pub fps: f64,
+    pub units: usd::Units,
+}
+
+impl MeshFile<'_> {
+    /// Writes a mesh. Files of USD have velocities of their own: `velocities` chooses them (m/s), given those among the arrays.
+    pub fn write(
+        &self,
+        mesh: &TriMesh,
+        uvs: Option<&Uvs>,
+        arrays: &[MeshArray],
+        velocities: impl FnOnce(Option<Vec<Vec3>>) -> frazil::Result<Vec<Vec3>>,
+    ) -> frazil::Result<()> {
+        let mut written: Vec<&MeshArray> = arrays.iter().collect();
+        if extension(self.path) != "usda" {
+            let carried = io::mesh::Carried { uvs, arrays: &written, ..Default::default() };
+            return io::mesh::write_carried(self.path, mesh, &carried);
+        }
+        let own = vectors(arrays, VELOCITY);
+        if own.is_some() {
+            written.retain(|array| array.on != On::Vertices || !VELOCITY.contains(&&*array.name));
+        }
+        let velocities = velocities(own)?;
+        let carried = io::mesh::Carried { velocities: &velocities, uvs, arrays: &written };
+        let mesh = usd::MeshFrame::of(self.name, mesh, &carried);
+        let text = usd::clip("meshes", self.frame, self.fps, self.units, &[mesh]);
+        atomic::write_bytes(self.path, text.as_bytes())
+    }
 }
 
 /// What determines the losses between two mesh files.
@@ -333,10 +365,9 @@ impl Args {
         if !is_character && (self.clip.is_some() || self.node.is_some()) {
             return Err(Failure::refused("--clip and --node are for .glb and .gltf files"));
         }
-        let one = FrameChoice::from(Frames { first: 1, last: 1 });
         match Pattern::parse(&self.input) {
             None if is_character => {
-                let frames = self.frames.clone().unwrap_or(one);
+                let frames = self.frames.clone().unwrap_or_else(one_frame);
                 let (node, clip) = (self.node.clone(), self.clip.clone());
                 let start = f64::from(frames.first()) / self.fps;
                 let play = Play { node, clip, repeat: true, start };
@@ -345,11 +376,9 @@ impl Args {
                 Ok((Source::One(Box::new(motion)), frames))
             }
             None if self.frames.is_some() => Err(Failure::refused("--frames is of no use with one mesh")),
-            None => Ok((Source::One(self.still(&self.input).before()?), one)),
+            None => Ok((Source::One(self.still(&self.input).before()?), one_frame())),
             Some(pattern) => {
-                let needed =
-                    || Failure::refused(format!("{}: a sequence needs --frames A-B", self.input.display()));
-                let frames = self.frames.clone().ok_or_else(needed)?;
+                let frames = self.frames.clone().ok_or_else(|| needs_frames(&self.input))?;
                 let last = frames.last();
                 Ok((Source::Sequence(Sequence { pattern, last, run: None }), frames))
             }
@@ -371,7 +400,7 @@ impl Args {
 
     /// The arrays of a frame's mesh, if the output holds any: characters have none.
     fn arrays(&self, output: &Path, frame: i32, is_sequence: bool) -> frazil::Result<Vec<MeshArray>> {
-        let input = Pattern::parse(&self.input).map_or_else(|| self.input.clone(), |p| p.path(frame));
+        let input = of_frame(&self.input, frame);
         if is_gltf(&input) || extension(output) == "stl" {
             return Ok(Vec::new());
         }
@@ -406,33 +435,16 @@ impl Args {
         };
         out(&mut pose);
         let (positions, drawn) = (usd::to_floats(&pose), motion.drawn());
+        let mesh = TriMesh { positions, triangles: drawn.triangles.to_vec() };
         let arrays = self.arrays(path, frame, is_sequence)?;
-        if extension(path) != "usda" {
-            let mesh = TriMesh { positions, triangles: drawn.triangles.to_vec() };
-            let arrays: Vec<&MeshArray> = arrays.iter().collect();
-            let carried = io::mesh::Carried { uvs: drawn.uvs, arrays: &arrays, ..Default::default() };
-            return io::mesh::write_carried(path, &mesh, &carried);
-        }
-        motion.velocities_ahead(time, 1.0 / self.fps, &mut velocities)?;
-        out(&mut velocities);
-        let own = vectors(&arrays, VELOCITY);
-        // USD has its own velocities.
-        let is_own = |array: &MeshArray| array.on == On::Vertices && VELOCITY.contains(&&*array.name);
-        let others = arrays.iter().filter(|array| !(own.is_some() && is_own(array)));
-        let others: Vec<&MeshArray> = others.collect();
-        // In a sequence, velocities lead from each mesh to the next.
-        let own = own.filter(|_| !is_sequence);
-        let velocities = own.unwrap_or_else(|| usd::to_floats(&velocities));
         let name = prim_name(&self.input);
-        let mesh = usd::MeshFrame {
-            name: &name,
-            points: &positions,
-            velocities: &velocities,
-            triangles: drawn.triangles,
-            uvs: drawn.uvs,
-            arrays: &others,
-        };
         let units = usd::Units { metres: 1.0 / self.to_scale, z_up: self.to_up == Axis::Z };
-        atomic::write_bytes(path, usd::clip("meshes", frame, self.fps, units, &[mesh]).as_bytes())
+        let file = MeshFile { path, name: &name, frame, fps: self.fps, units };
+        file.write(&mesh, drawn.uvs, &arrays, |own| {
+            motion.velocities_ahead(time, 1.0 / self.fps, &mut velocities)?;
+            out(&mut velocities);
+            // In a sequence, velocities lead from each mesh to the next.
+            Ok(own.filter(|_| !is_sequence).unwrap_or_else(|| usd::to_floats(&velocities)))
+        })
     }
 }

@@ -4,9 +4,13 @@ use frazil::Result;
 use frazil::geometry::mesh::weld::Weld;
 use frazil::geometry::mesh::{BY_OPTION, is_coarse};
 use frazil::geometry::{DVec3, PolygonMesh, TriMesh};
+use frazil::io::files::sequence::Pattern;
 use frazil::motion::{Space, Up};
 use frazil::render::Size;
-use std::path::Path;
+use frazil::scene::{FrameChoice, Frames};
+use std::path::{Path, PathBuf};
+
+use super::session::exit::Failure;
 
 /// Conversion of a file's space to metres with Y up.
 #[derive(clap::Args)]
@@ -95,6 +99,29 @@ pub fn warn_of_corners(path: &Path, mesh: &TriMesh) {
     if let Some(what) = Weld::of(&positions, &mesh.triangles).warning() {
         log::warn!("{}: {what}", path.display());
     }
+}
+
+/// The file of a frame, from one file or a pattern of files.
+pub fn of_frame(path: &Path, frame: i32) -> PathBuf {
+    Pattern::parse(path).map_or_else(|| path.to_path_buf(), |pattern| pattern.path(frame))
+}
+
+/// The only frame of what does not move.
+pub fn one_frame() -> FrameChoice {
+    FrameChoice::from(Frames { first: 1, last: 1 })
+}
+
+/// The error for a sequence whose frames are not chosen.
+pub fn needs_frames(sequence: &Path) -> Failure {
+    Failure::of_file(sequence, "a sequence needs --frames A-B")
+}
+
+/// Refuses to write several frames to one file instead of a pattern such as `example`.
+pub fn refuse_one_file(path: &Path, frames: &FrameChoice, example: &str) -> std::result::Result<(), Failure> {
+    if Pattern::parse(path).is_some() || frames.count() <= 1 {
+        return Ok(());
+    }
+    Err(Failure::of_file(path, format!("several frames need a pattern such as {example}")))
 }
 
 /// A picture's size: `1280x720`.

@@ -1,6 +1,6 @@
 //! Points in files, for `frazil info` and `frazil convert`.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use frazil::geometry::points::Values;
 use frazil::geometry::{DVec3, Points};
@@ -11,11 +11,12 @@ use frazil::io::particles::ply;
 use frazil::io::particles::{self, ParticleData};
 use frazil::io::usd::points;
 use frazil::motion::Space;
-use frazil::scene::{FrameChoice, Frames};
+use frazil::scene::FrameChoice;
 use frazil::{Error, Result};
 use serde_json::{Map, Value, json};
 
 use super::each::Each;
+use super::options::{needs_frames, of_frame, one_frame, refuse_one_file};
 use super::output;
 use super::session::Session;
 use super::session::exit::{Failure, Phase};
@@ -109,43 +110,35 @@ pub struct Conversion<'a> {
 impl Conversion<'_> {
     /// Converts every frame.
     pub fn run(&self, session: &Session) -> std::result::Result<(), Failure> {
-        let [input, output] = [self.input, self.output].map(Pattern::parse);
+        let is_sequence = Pattern::parse(self.input).is_some();
         let is_written = ["vdb", "usda"].contains(&extension(self.output).as_str());
         if !is_written && !particles::is_written(self.output) {
             let what = "the output for points must be a .vdb, .ply, .usda, .bgeo or .xyz file";
-            return Err(Failure::refused(format!("{}: {what}", self.output.display())));
+            return Err(Failure::of_file(self.output, what));
         }
         if extension(self.input) != "vdb" && !particles::is_named(self.input) {
             let what = "points are read from .vdb, .bgeo, .vtk, .vtu, .xyz and .ply files";
-            return Err(Failure::refused(format!("{}: {what}", self.input.display())));
+            return Err(Failure::of_file(self.input, what));
         }
-        if input.is_some() && self.frames.is_none() {
-            let what = format!("{}: a sequence needs --frames A-B", self.input.display());
-            return Err(Failure::refused(what));
+        if is_sequence && self.frames.is_none() {
+            return Err(needs_frames(self.input));
         }
-        if input.is_none() && self.frames.is_some_and(|frames| frames.count() > 1) {
+        if !is_sequence && self.frames.is_some_and(|frames| frames.count() > 1) {
             return Err(Failure::refused("several --frames are of no use with one file of points"));
         }
-        let frames = self.frames.cloned().unwrap_or_else(|| FrameChoice::from(Frames { first: 1, last: 1 }));
-        if output.is_none() && frames.count() > 1 {
-            let what =
-                format!("{}: several frames need a pattern such as grains.%04d.ply", self.output.display());
-            return Err(Failure::refused(what));
-        }
-        let position = |pattern: &Option<Pattern>, path: &Path, frame: i32| -> PathBuf {
-            pattern.as_ref().map_or_else(|| path.to_path_buf(), |pattern| pattern.path(frame))
-        };
+        let frames = self.frames.cloned().unwrap_or_else(one_frame);
+        refuse_one_file(self.output, &frames, "grains.%04d.ply")?;
         output::check_writable(self.output).before()?;
         for frame in frames.iter() {
-            let from = position(&input, self.input, frame);
-            output::refuse_input(&position(&output, self.output, frame), [from.as_path()]).before()?;
+            let from = of_frame(self.input, frame);
+            output::refuse_input(&of_frame(self.output, frame), [from.as_path()]).before()?;
         }
         let (mut each, mut made, mut count) = (Each::default(), 0, 0);
         for frame in frames.iter() {
             session.ctx.check().during()?;
             let one = || {
-                let read = self.read(&position(&input, self.input, frame))?;
-                self.write(&position(&output, self.output, frame), frame, &read, session)?;
+                let read = self.read(&of_frame(self.input, frame))?;
+                self.write(&of_frame(self.output, frame), frame, &read, session)?;
                 Ok(read.points.count())
             };
             if let Some(points) = each.take(frame, one())? {

@@ -4,7 +4,6 @@
 //! ([`winding`]); distances are computed block by block, eight voxels at a time ([`nearest`], [`triangle`]).
 
 pub mod lattice;
-pub mod lists;
 pub mod nearest;
 pub mod region;
 pub mod scanlines;

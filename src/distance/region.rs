@@ -3,6 +3,7 @@
 use super::Face;
 use super::lattice::{Fixed, UNITS, floor};
 use crate::error::{Error, Result};
+use crate::geometry::coords::is_between;
 
 /// Maximum number of blocks of a region: a `u32` for each then takes 1 GiB.
 const MOST_BLOCKS: u64 = 1 << 28;
@@ -55,7 +56,7 @@ impl Region {
 
     /// Whether a block lies in the region.
     pub fn holds(&self, block: [i32; 3]) -> bool {
-        (0..3).all(|axis| (self.low[axis]..=self.high[axis]).contains(&block[axis]))
+        is_between(block, self.low, self.high)
     }
 
     /// Index of a block of the region.
@@ -105,13 +106,6 @@ pub fn extent(v: &[Fixed; 3]) -> ([f32; 3], [f32; 3]) {
     let low = [0, 1, 2].map(|a| cell(v[0][a].min(v[1][a]).min(v[2][a])));
     let high = [0, 1, 2].map(|a| cell(v[0][a].max(v[1][a]).max(v[2][a])));
     (low, high)
-}
-
-/// Every block of the box `first..=last`, in ascending order.
-pub fn each_block(first: [i32; 3], last: [i32; 3]) -> impl Iterator<Item = [i32; 3]> {
-    (first[0]..=last[0]).flat_map(move |x| {
-        (first[1]..=last[1]).flat_map(move |y| (first[2]..=last[2]).map(move |z| [x, y, z]))
-    })
 }
 
 /// Block of a coordinate (cells); saturates.

@@ -9,9 +9,10 @@ use rayon::prelude::*;
 
 use super::Face;
 use super::lattice::{Fixed, UNITS, floor};
-use super::lists::Lists;
-use super::region::{Region, each_block, extent};
+use super::region::{Region, extent};
 use super::scanlines::Columns;
+use crate::geometry::coords::between;
+use crate::geometry::lists::Lists;
 
 /// The lines along z through the voxels of a region, each with its sorted crossings; only lines with faces above or below.
 pub struct Lines {
@@ -34,8 +35,7 @@ impl Lines {
         let mut columns = Columns::new(low, high);
         for face in faces {
             let (first, last) = region.touched(extent(&face.v), 0.01);
-            each_block([first[0], first[1], 0], [last[0], last[1], 0])
-                .for_each(|[x, y, _]| columns.add([x, y]));
+            between([first[0], first[1], 0], [last[0], last[1], 0]).for_each(|[x, y, _]| columns.add([x, y]));
         }
         let bounds = [0, 1].map(|axis| [i64::from(low[axis]) * 8, i64::from(high[axis]) * 8 + 7]);
         let cross = |chunk: &[Face]| {
@@ -48,7 +48,7 @@ impl Lines {
             out
         };
         let parts: Vec<Vec<(u32, (f64, i32))>> = faces.par_chunks(GRAIN).map(cross).collect();
-        let mut crossings = Lists::new(columns.lines(), &parts);
+        let mut crossings = Lists::new(columns.lines(), parts.iter().flatten().copied());
         crossings.each_mut(|line| {
             line.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             let mut winding = 0;

@@ -1,9 +1,13 @@
 //! Plain data shared by all modules; independent of file formats and of OpenVDB.
 
 pub mod check;
+pub mod coords;
+pub mod fans;
+pub mod lists;
 pub mod marching_cubes;
 pub mod mesh;
 pub mod points;
+pub mod shape;
 pub mod spatial;
 #[cfg(test)]
 pub(crate) mod test_meshes;

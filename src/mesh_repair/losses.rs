@@ -29,8 +29,7 @@ pub struct Losses {
 impl Losses {
     /// Compares a mesh, its closed version and the result.
     pub(super) fn of(before: &TriMesh, closed: &Closed, after: &TriMesh) -> Self {
-        let volume =
-            TriMesh { positions: closed.positions.clone(), triangles: closed.triangles.clone() }.volume();
+        let volume = closed.mesh.volume();
         let [old, new] = [before, after].map(named_bounds);
         let side = |[low, high]: [DVec3; 2]| (high - low).max().max(0.0);
         let shrunk = (new[0] - old[0]).sup(&(old[1] - new[1])).max();

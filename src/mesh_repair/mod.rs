@@ -110,7 +110,7 @@ pub fn repair(ctx: &Context, mesh: &TriMesh, cell: f64) -> Result<Repaired> {
     }
     let closed = ctx.phase("prepare", || Ok(prepare(mesh)))?;
     let mut lost = None;
-    let area = TriMesh { positions: closed.positions.clone(), triangles: closed.triangles.clone() }.area();
+    let area = closed.mesh.area();
     for halving in 0..HALVINGS {
         let cell = cell / f64::from(1u32 << halving);
         let allowed = allow(ctx, area, cell);
@@ -143,17 +143,16 @@ fn allow(ctx: &Context, area: f64, cell: f64) -> Result<()> {
 
 /// Tries the rebuild levels, for a mesh whose first `own` vertices are those of the input. None if nothing is left.
 fn rebuild(ctx: &Context, closed: &Closed, own: usize, cell: f64) -> Result<Option<Repaired>> {
-    let mesh = TriMesh { positions: closed.positions.clone(), triangles: closed.triangles.clone() };
-    let Some((low, high)) = mesh.bounds() else { return Ok(None) };
+    let Some((low, high)) = closed.mesh.bounds() else { return Ok(None) };
     let lattice = Lattice::near(cell, (low.cast::<f64>() + high.cast::<f64>()) / 2.0)?;
-    let mut in_cells = vec![DVec3::zeros(); closed.positions.len()];
+    let mut in_cells = vec![DVec3::zeros(); closed.mesh.positions.len()];
     // Unused vertices may be anywhere.
-    for &vertex in closed.triangles.as_flattened() {
-        in_cells[vertex as usize] = lattice.to_cells(closed.positions[vertex as usize].cast());
+    for &vertex in closed.mesh.triangles.as_flattened() {
+        in_cells[vertex as usize] = lattice.to_cells(closed.mesh.positions[vertex as usize].cast());
     }
     let fixed = in_cells.iter().map(|position| lattice.fix(*position)).collect::<Result<Vec<_>>>()?;
-    let pierces = Pierces::of(&fixed, &closed.triangles);
-    let shape = Shape { fixed, triangles: closed.triangles.clone(), pierces };
+    let pierces = Pierces::of(&fixed, &closed.mesh.triangles);
+    let shape = Shape { fixed, triangles: closed.mesh.triangles.clone(), pierces };
     ctx.check()?;
     let flagged = region::faulty_cells::flagged(ctx, closed, &shape)?;
     let rebuilt = ladder(ctx, &shape, (&in_cells, &lattice), &flagged, &shape.pierces)?;
@@ -297,7 +296,7 @@ fn finished(
     };
     let sources: Vec<Source> = draft.sources.iter().map(original).collect();
     let origin = DVec3::from(lattice.origin.map(f64::from));
-    let place = |(at, place): (usize, &DVec3)| match closed.positions.get(at) {
+    let place = |(at, place): (usize, &DVec3)| match closed.mesh.positions.get(at) {
         Some(position) => *position,
         None => ((place + origin) * lattice.voxel).cast(),
     };

@@ -1,7 +1,7 @@
 //! Moving meshes as their files have them: every vertex in the file's order, and texture coordinates.
 
 use crate::geometry::mesh::{renumbered, used};
-use crate::geometry::{PolygonMesh, Uvs, Vec3};
+use crate::geometry::{DVec3, PolygonMesh, Uvs, Vec3};
 
 /// A moving mesh as it is written.
 #[derive(Debug, Clone, Copy)]
@@ -19,8 +19,7 @@ pub(super) struct Faces {
     vertices: usize,
     triangles: Vec<[u32; 3]>,
     uvs: Option<Uvs>,
-    /// The vertices that triangles use, and the triangles over these; `None` if they use all.
-    moving: Option<(Vec<u32>, Vec<[u32; 3]>)>,
+    pub moving: Moving,
 }
 
 impl Faces {
@@ -28,10 +27,7 @@ impl Faces {
     pub fn new(polygons: PolygonMesh) -> (Self, Vec<Vec3>) {
         let (mesh, uvs) = polygons.into_textured();
         let (vertices, triangles) = (mesh.positions.len(), mesh.triangles);
-        let moving = used(vertices, &triangles).map(|used| {
-            let own = renumbered(&triangles, &used);
-            (used, own)
-        });
+        let moving = Moving::of(vertices, &triangles);
         (Self { vertices, triangles, uvs, moving }, mesh.positions)
     }
 
@@ -42,17 +38,34 @@ impl Faces {
 
     /// Triangles over the vertices that they use.
     pub fn triangles(&self) -> &[[u32; 3]] {
-        self.moving.as_ref().map_or(&self.triangles, |(_, own)| own)
+        self.moving.triangles(&self.triangles)
+    }
+}
+
+/// The vertices that move triangles: those that they use.
+pub(super) struct Moving {
+    /// Their number.
+    pub count: usize,
+    /// These vertices, and the triangles over them; `None` if triangles use all.
+    own: Option<(Vec<u32>, Vec<[u32; 3]>)>,
+}
+
+impl Moving {
+    /// Those of `count` vertices.
+    pub fn of(count: usize, triangles: &[[u32; 3]]) -> Self {
+        let Some(used) = used(count, triangles) else { return Self { count, own: None } };
+        let triangles = renumbered(triangles, &used);
+        Self { count: used.len(), own: Some((used, triangles)) }
     }
 
-    /// Number of vertices that triangles use.
-    pub fn count(&self) -> usize {
-        self.moving.as_ref().map_or(self.vertices, |(used, _)| used.len())
+    /// The triangles over these vertices; `all` are those over all vertices.
+    pub fn triangles<'a>(&'a self, all: &'a [[u32; 3]]) -> &'a [[u32; 3]] {
+        self.own.as_ref().map_or(all, |(_, own)| own)
     }
 
-    /// Keeps only the positions of vertices that triangles use.
-    pub fn keep_moving<T: Copy>(&self, positions: &mut Vec<T>) {
-        if let Some((used, _)) = &self.moving {
+    /// Keeps only the positions of these vertices.
+    pub fn keep(&self, positions: &mut Vec<DVec3>) {
+        if let Some((used, _)) = &self.own {
             // Indices ascend: no position is overwritten before it is read.
             used.iter().enumerate().for_each(|(to, &from)| positions[to] = positions[from as usize]);
             positions.truncate(used.len());

@@ -164,18 +164,18 @@ impl Motion for Rigid {
     }
 
     fn vertex_count(&self) -> usize {
-        self.faces.count()
+        self.faces.moving.count
     }
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         self.drawn_pose(time, out)?;
-        self.faces.keep_moving(out);
+        self.faces.moving.keep(out);
         Ok(())
     }
 
     fn pose_as_read(&self, _time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         out.clone_from(&self.positions);
-        self.faces.keep_moving(out);
+        self.faces.moving.keep(out);
         Ok(())
     }
 

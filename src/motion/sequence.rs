@@ -1,6 +1,5 @@
 //! A mesh per frame: vertices move straight from frame to frame.
 
-use std::path::PathBuf;
 use std::sync::{Arc, Mutex, OnceLock};
 
 use super::drawn::Faces;
@@ -25,7 +24,6 @@ pub struct MeshSequence {
     /// Polygons of the first frame, with their texture coordinates: all frames have these faces.
     polygons: PolygonMesh,
     faces: Faces,
-    first_path: PathBuf,
     /// Contents of the files when they were read.
     seen: Arc<InputHashes>,
     /// Subtracted from positions as they are read (the files' unit).
@@ -67,20 +65,7 @@ impl MeshSequence {
         polygons.uvs = None;
         let kept = Mutex::new(vec![(first, Arc::new(positions))]);
         let continues = OnceLock::new();
-        Ok(Self {
-            pattern,
-            first,
-            last,
-            fps,
-            offset,
-            polygons,
-            faces,
-            first_path,
-            seen,
-            origin,
-            continues,
-            kept,
-        })
+        Ok(Self { pattern, first, last, fps, offset, polygons, faces, seen, origin, continues, kept })
     }
 
     fn frame(&self, frame: i32) -> Result<Arc<Vec<Vec3>>> {
@@ -106,17 +91,14 @@ impl MeshSequence {
         let path = self.pattern.path(frame);
         let mesh = mesh::parse_polygons_from(&path, &self.seen.read(&path)?, self.origin)?;
         if !mesh.has_faces_of(&self.polygons) {
-            return Err(Error::file(
-                path,
-                format!(
-                    "has {} vertices and {} faces, not those of {} ({} and {}): a sequence must keep its faces",
-                    mesh.positions.len(),
-                    mesh.ends.len(),
-                    self.first_path.display(),
-                    self.polygons.positions.len(),
-                    self.polygons.ends.len()
-                ),
-            ));
+            let count = |of: &PolygonMesh| [of.positions.len(), of.ends.len()];
+            let ([vertices, faces], [own, own_faces]) = (count(&self.polygons), count(&mesh));
+            let first = self.pattern.path(self.first);
+            let what = format!(
+                "has {own} vertices and {own_faces} faces, not those of {} ({vertices} and {faces}): a sequence must keep its faces",
+                first.display()
+            );
+            return Err(Error::file(path, what));
         }
         Ok(mesh.positions)
     }
@@ -144,12 +126,12 @@ impl Motion for MeshSequence {
     }
 
     fn vertex_count(&self) -> usize {
-        self.faces.count()
+        self.faces.moving.count
     }
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         self.drawn_pose(time, out)?;
-        self.faces.keep_moving(out);
+        self.faces.moving.keep(out);
         Ok(())
     }
 

@@ -51,13 +51,15 @@ fn detect() -> CpuLevel {
     CpuLevel::Baseline
 }
 
-/// Calls a function's copy for the instruction set in use; `at most avx2` where wider vectors do not pay.
+/// Calls a function's copy for the instruction set in use; `at most avx2` where wider vectors do not pay. The function may be one of a type
+/// (`Rows::run`) and have generic arguments (`solve::<true>`).
 macro_rules! dispatch {
-    (at most avx2: $body:ident($($name:ident: $kind:ty),*) $(-> $out:ty)?) => {{
+    (at most avx2: $body:ident $(::$path:ident)* $(::<$($generic:tt),+>)?
+        ($($name:ident: $kind:ty),*) $(-> $out:ty)?) => {{
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx2")]
         fn avx2($($name: $kind),*) $(-> $out)? {
-            $body($($name),*)
+            $body $(::$path)* $(::<$($generic),+>)? ($($name),*)
         }
         match $crate::numeric::cpu::cpu_level() {
             // SAFETY: the level was detected on this processor.
@@ -65,19 +67,19 @@ macro_rules! dispatch {
             $crate::numeric::cpu::CpuLevel::Avx512 | $crate::numeric::cpu::CpuLevel::Avx2 => unsafe {
                 avx2($($name),*)
             },
-            _ => $body($($name),*),
+            _ => $body $(::$path)* $(::<$($generic),+>)? ($($name),*),
         }
     }};
-    ($body:ident($($name:ident: $kind:ty),*) $(-> $out:ty)?) => {{
+    ($body:ident $(::$path:ident)* $(::<$($generic:tt),+>)?($($name:ident: $kind:ty),*) $(-> $out:ty)?) => {{
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx2")]
         fn avx2($($name: $kind),*) $(-> $out)? {
-            $body($($name),*)
+            $body $(::$path)* $(::<$($generic),+>)? ($($name),*)
         }
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
         fn avx512($($name: $kind),*) $(-> $out)? {
-            $body($($name),*)
+            $body $(::$path)* $(::<$($generic),+>)? ($($name),*)
         }
         match $crate::numeric::cpu::cpu_level() {
             // SAFETY: the level was detected on this processor.
@@ -86,7 +88,7 @@ macro_rules! dispatch {
             // SAFETY: the level was detected on this processor.
             #[cfg(target_arch = "x86_64")]
             $crate::numeric::cpu::CpuLevel::Avx2 => unsafe { avx2($($name),*) },
-            _ => $body($($name),*),
+            _ => $body $(::$path)* $(::<$($generic),+>)? ($($name),*),
         }
     }};
 }

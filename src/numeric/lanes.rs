@@ -116,58 +116,27 @@ impl LaneMask {
     }
 }
 
-impl BitAnd for LaneMask {
-    type Output = Self;
+/// Declares operators that act lane by lane.
+macro_rules! operators {
+    ($($kind:ident: $operator:ident, $name:ident = $operation:ident;)+) => {$(
+        impl $operator for $kind {
+            type Output = Self;
 
-    #[inline(always)]
-    fn bitand(self, other: Self) -> Self {
-        Self(each(&self.0, &other.0, half::and))
-    }
+            #[inline(always)]
+            fn $name(self, other: Self) -> Self {
+                Self(each(&self.0, &other.0, half::$operation))
+            }
+        }
+    )+};
 }
 
-impl BitOr for LaneMask {
-    type Output = Self;
-
-    #[inline(always)]
-    fn bitor(self, other: Self) -> Self {
-        Self(each(&self.0, &other.0, half::or))
-    }
-}
-
-impl Add for Lanes {
-    type Output = Self;
-
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Self(each(&self.0, &other.0, half::add))
-    }
-}
-
-impl Sub for Lanes {
-    type Output = Self;
-
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Self(each(&self.0, &other.0, half::sub))
-    }
-}
-
-impl Mul for Lanes {
-    type Output = Self;
-
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        Self(each(&self.0, &other.0, half::mul))
-    }
-}
-
-impl Div for Lanes {
-    type Output = Self;
-
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        Self(each(&self.0, &other.0, half::div))
-    }
+operators! {
+    LaneMask: BitAnd, bitand = and;
+    LaneMask: BitOr, bitor = or;
+    Lanes: Add, add = add;
+    Lanes: Sub, sub = sub;
+    Lanes: Mul, mul = mul;
+    Lanes: Div, div = div;
 }
 
 /// Four numbers in an SSE register.

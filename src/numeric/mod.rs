@@ -8,4 +8,6 @@ pub mod cpu;
 pub mod digits;
 #[doc(hidden)]
 pub mod lanes;
+#[doc(hidden)]
+pub mod lists;
 pub mod packed;

@@ -177,7 +177,8 @@ pub(super) fn direction(azimuth_deg: f64, elevation_deg: f64) -> DVec3 {
     DVec3::new(side * level, up, ahead * level)
 }
 
-fn corner(bounds: (DVec3, DVec3), index: usize) -> DVec3 {
+/// The corner of a box with this index, 0 to 7.
+pub(in crate::render) fn corner(bounds: (DVec3, DVec3), index: usize) -> DVec3 {
     let pick = |axis: usize| if index >> axis & 1 == 0 { bounds.0[axis] } else { bounds.1[axis] };
     DVec3::new(pick(0), pick(1), pick(2))
 }

@@ -1,5 +1,6 @@
 //! Grids to be drawn: level sets as surfaces, fog volumes as fog, both as fields to be cut.
 
+use super::camera::corner;
 use super::cut::Field;
 use super::fog::{Fog, Part, Placement};
 use super::model::{Model, smooth_normals};
@@ -98,14 +99,10 @@ fn range(ctx: &Context, grid: &FloatGrid) -> Result<[f32; 2]> {
 /// Minimum and maximum corner of the active voxels of a grid (m); none without any.
 fn bounds_of(grid: &FloatGrid) -> Option<(DVec3, DVec3)> {
     let (low, high) = grid.active_bbox()?;
-    let corner = |n: usize| {
-        let end = |axis: usize| {
-            if n >> axis & 1 == 0 { f64::from(low[axis]) - 0.5 } else { f64::from(high[axis]) + 0.5 }
-        };
-        grid.index_to_world(DVec3::from([0, 1, 2].map(end)))
-    };
-    let corners = (0..8).map(|n| (corner(n), corner(n)));
-    corners.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))
+    let bounds =
+        (DVec3::from(low.map(|at| f64::from(at) - 0.5)), DVec3::from(high.map(|at| f64::from(at) + 0.5)));
+    let corners = (0..8).map(|n| grid.index_to_world(corner(bounds, n)));
+    corners.map(|at| (at, at)).reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))
 }
 
 /// Memory (bytes) of a block of a tile while it is prepared.
@@ -135,9 +132,9 @@ fn placement(grid: &FloatGrid) -> Option<Placement> {
     let placement = Placement::new(origin, axes)?;
     // Perspective shows at the corners of the active voxels.
     let (low, high) = grid.active_bbox().unwrap_or_default();
+    let bounds = (DVec3::from(low.map(f64::from)), DVec3::from(high.map(f64::from)));
     let is_linear = (0..8).all(|n| {
-        let corner = [0, 1, 2].map(|axis| f64::from(if n >> axis & 1 == 0 { low[axis] } else { high[axis] }));
-        let corner = DVec3::from(corner);
+        let corner = corner(bounds, n);
         let off = grid.index_to_world(corner) - placement.to_world(corner);
         off.norm() <= 1.0e-6 * placement.cell() * (1.0 + corner.norm())
     });

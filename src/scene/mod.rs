@@ -25,6 +25,8 @@ pub mod shallow;
 pub mod snow;
 pub mod surface;
 mod systems;
+#[cfg(feature = "vdb")]
+mod vdb_metadata;
 
 pub use objects::Objects;
 pub use schema::{FrameChoice, Frames, Override, Value, Values};

@@ -2,9 +2,7 @@
 
 use std::sync::Arc;
 
-use super::run::{
-    Clip, FrameFiles, Kind, MovingMesh, Prims, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To,
-};
+use super::run::{FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To};
 use super::{Role, Scene, moving};
 use crate::context::Context;
 use crate::error::Result;
@@ -12,6 +10,7 @@ use crate::geometry::{DVec3, TriMesh, Uvs, Vec3};
 use crate::io::records::input_hashes::InputHashes;
 use crate::io::records::manifest::Keeps;
 use crate::io::usd::materials::Look;
+use crate::io::usd::{ClipPrims, Clips, MeshPrim};
 use crate::io::{mesh, usd};
 use crate::motion::Drawn;
 use crate::scene::run::settings::settings_of;
@@ -75,20 +74,12 @@ impl Stage for Objects<'_> {
         &[Kind { name: "objects", extensions: &["usda", "ply"] }]
     }
 
-    fn writes(&self, _kind: &str) -> bool {
-        true
-    }
-
     fn loose_files(&self) -> &'static [&'static str] {
         if self.scene.output.objects_usd { &[MANIFEST] } else { &[] }
     }
 
     fn settings(&self) -> Result<Settings> {
         settings_of(self.scene, self.name(), self.seen, &Role::MOVING)
-    }
-
-    fn of_first_state(&self, _settings: &Settings) -> Settings {
-        Settings::new()
     }
 
     fn remembers(&self) -> bool {
@@ -103,12 +94,12 @@ impl Stage for Objects<'_> {
         Keeps::Whole
     }
 
-    fn clip(&self) -> Option<Clip<'_>> {
+    fn clip(&self) -> Option<Clips<'_>> {
         let uvs = self.bodies.iter().map(|body| body.motion().drawn().uvs);
         let named = self.names.iter().cloned().zip(uvs);
-        let mesh = |(name, uvs)| MovingMesh { name, look: Look::Object, uvs, primvars: Vec::new() };
-        let meshes = named.map(mesh).collect();
-        Some(Clip { kind: "objects", manifest: MANIFEST, prims: Prims::Meshes(meshes) })
+        let mesh =
+            |(name, uvs)| MeshPrim { name, look: Look::Object, moves: true, uvs, primvars: Vec::new() };
+        Some(Clips::new("objects", ClipPrims::Meshes(named.map(mesh).collect())))
     }
 }
 

@@ -4,7 +4,9 @@ use super::columns::Columns;
 use super::columns::grid::BOTTOMLESS;
 use super::free_fall::Falling;
 use super::params::{Friction, Params, Section};
+use super::pipes::cliffs::beside;
 use super::pipes::pipe_rules::{ExcludedCells, Rules};
+use super::pipes::side::Side;
 use super::pipes::{Border, Pipes};
 use super::remap::Remap;
 use super::scalars::amounts::Account;
@@ -15,8 +17,7 @@ use super::solver::thickening::Thick;
 use super::sources::{FlowPoint, Flows};
 use super::terrain::Solids;
 use super::terrain::identity::Identity;
-use super::time_step;
-use super::time_step::{Measures, Next};
+use super::time_step::{self, Measures, Next};
 use crate::context::Context;
 use crate::error::{Error, Result};
 
@@ -342,16 +343,9 @@ impl Shallow {
             return [0.0; 2];
         }
         let [east, south] = &self.flow.flux;
-        let strip = index / super::columns::STRIP;
-        let west = if index.is_multiple_of(super::columns::STRIP) {
-            self.columns.west(strip).map_or(0.0, |_| east[index - 1])
-        } else {
-            east[index - 1]
-        };
-        let north = match self.columns.north(strip) {
-            super::columns::NONE => 0.0,
-            north => south[north as usize * super::columns::STRIP + index % super::columns::STRIP],
-        };
+        let inflow =
+            |flux: &[f32], side| beside(&self.columns, index, side).map_or(0.0, |before| flux[before]);
+        let (west, north) = (inflow(east, Side::West), inflow(south, Side::North));
         let scale = (0.5 * self.columns.grid.cell / self.flow.last) as f32 / depth as f32;
         [(east[index] + west) * scale, (south[index] + north) * scale]
     }

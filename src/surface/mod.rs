@@ -31,6 +31,7 @@
 mod level_set;
 mod params;
 mod particles;
+mod pieces;
 mod remesh;
 mod report;
 mod state;

@@ -5,7 +5,6 @@ use xxhash_rust::xxh3::xxh3_128;
 use super::params::Params;
 use super::remesh::drift::{Drift, WINDOW};
 use super::remesh::sizes;
-use super::track::ahead::Ahead;
 use super::tracked_mesh::Tracker;
 use crate::error::{Error, Result};
 use crate::geometry::{DVec3, TriMesh};
@@ -129,20 +128,8 @@ impl Tracker {
             (true, own) if own == count => drift,
             (true, _) => return wrong("has displacements that do not fit".into()),
         };
-        Ok(Self {
-            params,
-            vertices,
-            triangles,
-            delta,
-            detail_retention,
-            flags,
-            bare,
-            reach,
-            is_rebuilt,
-            sizes,
-            drift,
-            ahead: Ahead::default(),
-        })
+        let own = Self::of(params, vertices, triangles);
+        Ok(Self { delta, detail_retention, flags, bare, reach, is_rebuilt, sizes, drift, ..own })
     }
 }
 

@@ -1,8 +1,13 @@
 //! Helpers shared by unit tests: balls of particles one spacing apart, which is 1 m, and their surface.
 
 use super::{Implicit, Isosurface, Particles};
-use crate::context::Context;
+use crate::context::{Context, Pool};
 use crate::geometry::{DVec3, TriMesh};
+
+/// A context of this many threads; 0: one for each core.
+pub fn context(threads: usize) -> Context {
+    Context::new(Pool::new(threads).unwrap())
+}
 
 /// Positions of a lattice between two distances (m) from its centre; with `from` = 0 they are a ball.
 pub fn shell(centre: DVec3, from: f64, to: f64) -> Vec<DVec3> {

@@ -44,6 +44,26 @@ pub struct Tracker {
 }
 
 impl Tracker {
+    /// A mesh, with vertices at these positions (m), of which nothing else is known.
+    pub(super) fn of(params: Params, vertices: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
+        let (delta, detail_retention, flags, bare, sizes) = Default::default();
+        let (reach, is_rebuilt, drift, ahead) = (REACH[0], false, Drift::default(), Ahead::default());
+        Self {
+            params,
+            vertices,
+            triangles,
+            delta,
+            detail_retention,
+            flags,
+            bare,
+            reach,
+            is_rebuilt,
+            sizes,
+            drift,
+            ahead,
+        }
+    }
+
     /// Sets the parameters from the next step on.
     ///
     /// # Errors

@@ -11,7 +11,6 @@ use super::level_set::isosurface::Isosurface;
 use super::level_set::sampler::Sampler;
 use super::params::Params;
 use super::particles::agreement::warn_of_tears;
-use super::particles::grid::cell_of;
 use super::particles::paths::Paths;
 use super::remesh::drift::Drift;
 use super::remesh::sizes;
@@ -29,6 +28,7 @@ use super::tracked_mesh::{REACH, Tracker};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::check::topology::Topology;
+use crate::geometry::coords::cell_of;
 use crate::geometry::{DVec3, TriMesh};
 
 /// How far the band reaches (r), tried one after the other at the first frame, around vertices that have not found the surface.
@@ -77,27 +77,12 @@ impl Tracker {
             ));
         }
         let vertices: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
-        let flags = vec![false; vertices.len()];
-        let (delta, detail_retention, bare, reach) = (Vec::new(), Vec::new(), Vec::new(), REACH[0]);
-        let triangles = mesh.triangles.clone();
-        let is_rebuilt = false;
-        let ahead = Ahead::default();
-        let sizes = if params.rebuild { sizes(&vertices, &mesh.triangles) } else { Vec::new() };
-        let drift = if params.rebuild { Drift::at_reference(vertices.len()) } else { Drift::default() };
-        let mut tracker = Self {
-            params,
-            vertices,
-            triangles,
-            delta,
-            detail_retention,
-            flags,
-            bare,
-            reach,
-            is_rebuilt,
-            sizes,
-            drift,
-            ahead,
-        };
+        let mut tracker = Self::of(params, vertices, mesh.triangles.clone());
+        tracker.flags = vec![false; mesh.positions.len()];
+        if params.rebuild {
+            tracker.sizes = sizes(&tracker.vertices, &mesh.triangles);
+            tracker.drift = Drift::at_reference(mesh.positions.len());
+        }
         let surface = ctx.phase("phi", || tracker.surface_of(ctx, particles))?;
         let (mut deep, mut tries) = (Deep::new(), TRIES.into_iter());
         loop {
@@ -225,6 +210,34 @@ impl Tracker {
             self.drift = self.drift.next(drifts);
         }
         Ok(report)
+    }
+
+    /// Prefetches the particles of the step after next: while the mesh is rebuilt, their surface is computed on idle threads. The result is
+    /// identical.
+    pub fn set_ahead(&mut self, particles: Arc<Particles>) {
+        self.ahead.wanted = Some(particles);
+    }
+
+    /// Drops the prefetched surface: its step is done elsewhere.
+    pub fn forget_ahead(&mut self) {
+        self.ahead = Ahead::default();
+    }
+
+    /// Runs `work`, and computes the surface of the coming particles at the same time.
+    fn with_next<R>(&self, ctx: &Context, work: impl FnOnce() -> Result<R>) -> Result<(R, Ahead)> {
+        let wanted = self.ahead.wanted.clone().filter(|_| ctx.pool().threads() > 1);
+        std::thread::scope(|scope| {
+            let surface_of = |particles: &Particles| ctx.pool().install(|| self.surface_of(ctx, particles));
+            let making = wanted.as_ref().map(|particles| scope.spawn(move || surface_of(particles)));
+            let done = work()?;
+            let (Some(making), Some(particles)) = (making, &wanted) else {
+                return Ok((done, Ahead::default()));
+            };
+            let made = making.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            // An error here will occur again in that frame's own step, and is reported there.
+            let ready = made.ok().map(|surface| (particles.clone(), Arc::new(surface)));
+            Ok((done, Ahead { wanted: None, ready }))
+        })
     }
 
     /// What the mesh does not cover of the particles' surface: whole uncovered parts, and the vertices beside uncovered positions of other

@@ -65,10 +65,7 @@ pub fn any_to_bytes(grids: &[GridRef<'_>], options: &WriteOptions) -> Result<Vec
 /// # Errors
 /// A file that is missing, empty, cut short or damaged.
 pub fn describe(path: &Path) -> Result<Vec<GridInfo>> {
-    match guard::of(path) {
-        Some(guard) => guard.describe(path),
-        None => decode::describe(path),
-    }
+    guard::of(path).map_or_else(|| decode::describe(path), |guard| guard.describe(path))
 }
 
 /// The metadata of the file itself, as [`WriteOptions::metadata`] sets it; read without OpenVDB. None if the file's version is newer than
@@ -102,10 +99,7 @@ pub fn metadata(path: &Path) -> Result<Vec<(String, MetaValue)>> {
 /// # Errors
 /// As [`describe`]; a grid of another type (named); no grid at all.
 pub fn read(path: &Path) -> Result<Vec<FloatGrid>> {
-    match guard::of(path) {
-        Some(guard) => guard.read(path),
-        None => decode::read(path),
-    }
+    guard::of(path).map_or_else(|| decode::read(path), |guard| guard.read(path))
 }
 
 /// As [`read`], always in this process: for files whose content is known by its hash.
@@ -121,10 +115,7 @@ pub fn read_own(path: &Path) -> Result<Vec<FloatGrid>> {
 /// # Errors
 /// As [`describe`]; no such grid (the file's grids are named); values that are not finite.
 pub fn read_named(path: &Path, name: Option<&str>) -> Result<FloatGrid> {
-    match guard::of(path) {
-        Some(guard) => guard.read_named(path, name),
-        None => decode::read_named(path, name),
-    }
+    guard::of(path).map_or_else(|| decode::read_named(path, name), |guard| guard.read_named(path, name))
 }
 
 /// The float grid with that index in the list of [`describe`]: this can read each of several grids with one name.
@@ -132,10 +123,7 @@ pub fn read_named(path: &Path, name: Option<&str>) -> Result<FloatGrid> {
 /// # Errors
 /// As [`read_named`].
 pub fn read_nth(path: &Path, index: usize) -> Result<FloatGrid> {
-    match guard::of(path) {
-        Some(guard) => guard.read_nth(path, index),
-        None => decode::read_nth(path, index),
-    }
+    guard::of(path).map_or_else(|| decode::read_nth(path, index), |guard| guard.read_nth(path, index))
 }
 
 /// A level set of a file, found as by [`read_named`], with distances in metres: see [`distances::mended`]. Faults of its values are logged,
@@ -177,10 +165,7 @@ pub fn read_own_named(path: &Path, name: &str) -> Result<FloatGrid> {
 /// # Errors
 /// As [`read_named`].
 pub fn read_any(path: &Path, name: Option<&str>) -> Result<AnyGrid> {
-    match guard::of(path) {
-        Some(guard) => guard.read_any(path, name),
-        None => decode::read_any(path, name),
-    }
+    guard::of(path).map_or_else(|| decode::read_any(path, name), |guard| guard.read_any(path, name))
 }
 
 /// As [`read_named`], from the bytes of a .vdb file.

@@ -1,15 +1,16 @@
 //! A process that ends at once leaves no file that it has begun. Other writers of this process would lose theirs.
 
+use crate::program::Folder;
 use crate::turn;
 use frazil::io::files::atomic;
 
 #[test]
 fn what_is_begun_goes_when_a_process_ends_at_once() {
     let _turn = turn();
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("base.0001.vdb");
+    let folder = Folder::empty();
+    let path = folder.join("base.0001.vdb");
     std::fs::write(&path, "whole").unwrap();
-    let there = || std::fs::read_dir(folder.path()).unwrap().count();
+    let there = || std::fs::read_dir(&folder).unwrap().count();
     let written = atomic::write(&path, |out| {
         out.write_all(b"half")?;
         assert_eq!(there(), 2);

@@ -7,14 +7,13 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use crate::common::character::output;
-use crate::program::CUBE;
+use crate::program::{CUBE, Folder};
 use crate::turn;
 use frazil::io::records::manifest::Keeps;
 use frazil::scene::run::verify::verify;
 use frazil::scene::run::{FrameFiles, Kind, Report, Run, Settings, Stage, Stepped, Stepping, Stored, To};
 use frazil::scene::{FrameChoice, Inputs, Scene, snow};
 use frazil::{Context, Error, Pool, Result};
-use tempfile::TempDir;
 
 const SCENE: &str = "[shot]\nframes = \"1-8\"\n[snow]\nground = 0.0\narea = [-0.5, -0.5, 0.5, 1.5]\ndepth = 0.3\n\
                      cell = 0.04\n[output]\nobjects = [\"ply\"]\n[[object]]\nfile = \"cube.obj\"\n\
@@ -131,10 +130,10 @@ fn run(folder: &Path, out: &str, asked: &Asked<'_>) -> Result<Vec<(&'static str,
     Ok(made.into_inner().unwrap())
 }
 
-fn folder() -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
-    fs::write(folder.path().join("shot.toml"), SCENE).unwrap();
+fn folder() -> Folder {
+    let folder = Folder::empty();
+    fs::write(folder.join("cube.obj"), CUBE).unwrap();
+    fs::write(folder.join("shot.toml"), SCENE).unwrap();
     folder
 }
 
@@ -182,117 +181,112 @@ fn wait_for(path: &Path, child: &mut Child) {
 fn killed_in_any_stage_a_run_resumes_to_the_same_bytes() {
     let _turn = turn();
     let folder = folder();
-    run(folder.path(), "once", &ALL).unwrap();
-    let state = folder.path().join("killed/state");
+    run(&folder, "once", &ALL).unwrap();
+    let state = folder.join("killed/state");
     for record in ["base.0003.json", "objects.0005.json", "tally.0002.json", "tally.0006.json"] {
-        let mut child = another(folder.path());
+        let mut child = another(&folder);
         wait_for(&state.join(record), &mut child);
         child.kill().unwrap();
         child.wait().unwrap();
     }
     assert!(state.join("tally.0006.json").exists() && !state.join("tally.0008.json").exists());
-    let made = run(folder.path(), "killed", &ALL).unwrap();
+    let made = run(&folder, "killed", &ALL).unwrap();
     assert!(of_stage(&made, "base").is_empty() && !of_stage(&made, "tally").is_empty(), "{made:?}");
-    assert_eq!(differences(folder.path(), "once", "killed"), Vec::<String>::new());
-    assert!(
-        verify(&Context::new(Pool::new(1).unwrap()), &folder.path().join("killed"))
-            .unwrap()
-            .damaged
-            .is_empty()
-    );
+    assert_eq!(differences(&folder, "once", "killed"), Vec::<String>::new());
+    assert!(verify(&Context::new(Pool::new(1).unwrap()), &folder.join("killed")).unwrap().damaged.is_empty());
 }
 
 #[test]
 fn a_stage_is_made_again_alone_and_takes_what_reads_it_along() {
     let _turn = turn();
     let folder = folder();
-    let made = run(folder.path(), "once", &ALL).unwrap();
+    let made = run(&folder, "once", &ALL).unwrap();
     assert_eq!(made.len(), 24);
     // One stage, from a frame on, with another setting: the others stay as they are.
-    run(folder.path(), "out", &ALL).unwrap();
+    run(&folder, "out", &ALL).unwrap();
     let heavy = Asked { weight: 2, ..ALL };
-    let refused = run(folder.path(), "out", &heavy).unwrap_err().to_string();
+    let refused = run(&folder, "out", &heavy).unwrap_err().to_string();
     assert!(refused.contains("stage tally") && refused.contains("tally.weight was 1"), "{refused}");
     // The states of frames before the last two are gone.
-    let refused = run(folder.path(), "out", &Asked { from: Some(4), stages: &["tally"], ..heavy });
+    let refused = run(&folder, "out", &Asked { from: Some(4), stages: &["tally"], ..heavy });
     assert!(refused.unwrap_err().to_string().contains("--from 8"));
-    let made = run(folder.path(), "out", &Asked { from: Some(8), stages: &["tally"], ..heavy }).unwrap();
+    let made = run(&folder, "out", &Asked { from: Some(8), stages: &["tally"], ..heavy }).unwrap();
     assert_eq!(made, [("tally", 8)]);
     let changed =
         ["state/tally.0008.json", "state/tally.0008.txt", "state/tally.json", "tally/tally.0008.txt"];
-    assert_eq!(differences(folder.path(), "once", "out"), changed);
+    assert_eq!(differences(&folder, "once", "out"), changed);
     // The base from a frame on: what reads it goes too, what does not stays.
-    let made = run(folder.path(), "out", &Asked { from: Some(3), stages: &["base"], ..ALL }).unwrap();
+    let made = run(&folder, "out", &Asked { from: Some(3), stages: &["base"], ..ALL }).unwrap();
     assert_eq!(made, (3..=8).map(|frame| ("base", frame)).collect::<Vec<_>>());
-    let out = folder.path().join("out");
+    let out = folder.join("out");
     assert!(out.join("state/tally.0002.json").exists() && !out.join("state/tally.0003.json").exists());
     assert!(!out.join("tally/tally.0003.txt").exists() && out.join("objects/objects.0008.ply").exists());
     // All of them again, from the start of the one that has no state left.
-    let made = run(folder.path(), "out", &Asked { from: Some(1), stages: &["tally"], ..ALL }).unwrap();
+    let made = run(&folder, "out", &Asked { from: Some(1), stages: &["tally"], ..ALL }).unwrap();
     assert_eq!(of_stage(&made, "tally"), (1..=8).collect::<Vec<_>>());
     // The base's records say from which frame on it was made again; what it holds is the same.
     let of_others = |name: &String| name.starts_with("tally") || name.contains("objects");
-    assert_eq!(differences(folder.path(), "once", "out").into_iter().find(of_others), None);
+    assert_eq!(differences(&folder, "once", "out").into_iter().find(of_others), None);
 }
 
 #[test]
 fn what_a_stage_reads_must_be_there_and_what_was_written() {
     let _turn = turn();
     let folder = folder();
-    let alone = run(folder.path(), "out", &Asked { stages: &["tally"], ..ALL }).unwrap_err().to_string();
+    let alone = run(&folder, "out", &Asked { stages: &["tally"], ..ALL }).unwrap_err().to_string();
     assert!(alone.contains("frame 1 of stage tally needs that of stage base"), "{alone}");
-    let unknown = run(folder.path(), "out", &Asked { stages: &["grains"], ..ALL }).unwrap_err().to_string();
+    let unknown = run(&folder, "out", &Asked { stages: &["grains"], ..ALL }).unwrap_err().to_string();
     assert!(unknown.contains("no stage \"grains\"") && unknown.contains("base, objects, tally"), "{unknown}");
-    run(folder.path(), "out", &Asked { stages: &["base"], ..ALL }).unwrap();
-    let base = folder.path().join("out/base/base.0004.vdb");
+    run(&folder, "out", &Asked { stages: &["base"], ..ALL }).unwrap();
+    let base = folder.join("out/base/base.0004.vdb");
     let whole = fs::read(&base).unwrap();
     let mut bytes = whole.clone();
     bytes[whole.len() / 2] ^= 1;
     fs::write(&base, &bytes).unwrap();
-    let damaged = run(folder.path(), "out", &Asked { stages: &["tally"], ..ALL }).unwrap_err().to_string();
+    let damaged = run(&folder, "out", &Asked { stages: &["tally"], ..ALL }).unwrap_err().to_string();
     assert!(damaged.contains("base.0004.vdb"), "{damaged}");
     fs::write(&base, &whole).unwrap();
-    assert_eq!(of_stage(&run(folder.path(), "out", &ALL).unwrap(), "tally"), [4, 5, 6, 7, 8]);
+    assert_eq!(of_stage(&run(&folder, "out", &ALL).unwrap(), "tally"), [4, 5, 6, 7, 8]);
 }
 
 #[test]
 fn frames_whose_upstream_frames_have_changed_are_refused() {
     let _turn = turn();
     let folder = folder();
-    run(folder.path(), "out", &ALL).unwrap();
+    run(&folder, "out", &ALL).unwrap();
     // A scene without the third stage knows nothing of its frames and leaves them.
     let other = Asked { seed: 2, ..ALL };
-    run(folder.path(), "out", &Asked { from: Some(5), tallies: false, ..other }).unwrap();
-    assert!(folder.path().join("out/state/tally.0005.json").exists());
-    let refused = run(folder.path(), "out", &other).unwrap_err().to_string();
+    run(&folder, "out", &Asked { from: Some(5), tallies: false, ..other }).unwrap();
+    assert!(folder.join("out/state/tally.0005.json").exists());
+    let refused = run(&folder, "out", &other).unwrap_err().to_string();
     assert!(
         refused.contains("the inputs of frame 5 have changed") && refused.contains("stage base"),
         "{refused}"
     );
-    let made = run(folder.path(), "out", &Asked { from: Some(1), stages: &["tally"], ..other }).unwrap();
+    let made = run(&folder, "out", &Asked { from: Some(1), stages: &["tally"], ..other }).unwrap();
     assert_eq!(of_stage(&made, "tally"), (1..=8).collect::<Vec<_>>());
-    assert!(run(folder.path(), "out", &other).unwrap().is_empty());
+    assert!(run(&folder, "out", &other).unwrap().is_empty());
 }
 
 #[test]
 fn frames_upstream_may_go_once_they_were_read() {
     let _turn = turn();
     let folder = folder();
-    run(folder.path(), "once", &ALL).unwrap();
-    run(folder.path(), "out", &Asked { frames: "1-6", ..ALL }).unwrap();
+    run(&folder, "once", &ALL).unwrap();
+    run(&folder, "out", &Asked { frames: "1-6", ..ALL }).unwrap();
     for frame in [2, 3] {
         for file in [format!("state/base.{frame:04}.json"), format!("base/base.{frame:04}.vdb")] {
-            fs::remove_file(folder.path().join("out").join(file)).unwrap();
+            fs::remove_file(folder.join("out").join(file)).unwrap();
         }
     }
     let tally = Asked { stages: &["tally"], ..ALL };
-    let refused = run(folder.path(), "out", &tally).unwrap_err().to_string();
+    let refused = run(&folder, "out", &tally).unwrap_err().to_string();
     assert!(refused.contains("frame 7 of stage tally needs that of stage base"), "{refused}");
-    run(folder.path(), "out", &Asked { stages: &["base", "objects"], frames: "7-8", ..ALL }).unwrap();
-    assert_eq!(run(folder.path(), "out", &tally).unwrap(), [("tally", 7), ("tally", 8)]);
+    run(&folder, "out", &Asked { stages: &["base", "objects"], frames: "7-8", ..ALL }).unwrap();
+    assert_eq!(run(&folder, "out", &tally).unwrap(), [("tally", 7), ("tally", 8)]);
     // They are made again as they were, and nothing that read them has changed.
-    assert_eq!(run(folder.path(), "out", &ALL).unwrap(), [("base", 2), ("base", 3)]);
-    assert_eq!(differences(folder.path(), "once", "out"), Vec::<String>::new());
+    assert_eq!(run(&folder, "out", &ALL).unwrap(), [("base", 2), ("base", 3)]);
+    assert_eq!(differences(&folder, "once", "out"), Vec::<String>::new());
 }
 
 #[test]
@@ -300,21 +294,21 @@ fn frames_on_the_way_need_theirs_upstream() {
     let _turn = turn();
     let folder = folder();
     let last = Asked { frames: "8", ..ALL };
-    run(folder.path(), "out", &Asked { stages: &["base"], ..last }).unwrap();
-    let refused = run(folder.path(), "out", &Asked { stages: &["tally"], ..last }).unwrap_err().to_string();
+    run(&folder, "out", &Asked { stages: &["base"], ..last }).unwrap();
+    let refused = run(&folder, "out", &Asked { stages: &["tally"], ..last }).unwrap_err().to_string();
     assert!(refused.contains("frame 1 of stage tally needs that of stage base"), "{refused}");
-    assert!(!folder.path().join("out/tally/tally.0008.txt").exists());
+    assert!(!folder.join("out/tally/tally.0008.txt").exists());
 }
 
 #[test]
 fn a_stage_that_panics_keeps_its_words_and_stops_the_others() {
     let _turn = turn();
     let folder = folder();
-    let broken = std::panic::catch_unwind(|| run(folder.path(), "out", &Asked { weight: TOO_HEAVY, ..ALL }));
+    let broken = std::panic::catch_unwind(|| run(&folder, "out", &Asked { weight: TOO_HEAVY, ..ALL }));
     let words = broken.unwrap_err();
     assert_eq!(words.downcast_ref::<&str>(), Some(&"the scales broke"));
     // Whole frames are left, and the lock is not.
-    let made = run(folder.path(), "out", &Asked { from: Some(1), stages: &["tally"], ..ALL }).unwrap();
+    let made = run(&folder, "out", &Asked { from: Some(1), stages: &["tally"], ..ALL }).unwrap();
     assert_eq!(of_stage(&made, "tally"), (1..=8).collect::<Vec<_>>());
 }
 
@@ -322,7 +316,7 @@ fn a_stage_that_panics_keeps_its_words_and_stops_the_others() {
 fn damage_is_named_in_every_stage() {
     let _turn = turn();
     let folder = folder();
-    run(folder.path(), "out", &ALL).unwrap();
+    run(&folder, "out", &ALL).unwrap();
     let ctx = Context::new(Pool::new(1).unwrap());
     for name in [
         "state/tally.0008.txt",
@@ -335,40 +329,40 @@ fn damage_is_named_in_every_stage() {
         "base/base.0006.vdb",
         "report/objects.0003.json",
     ] {
-        let path = folder.path().join("out").join(name);
+        let path = folder.join("out").join(name);
         let whole = fs::read(&path).unwrap();
         let mut bytes = whole.clone();
         bytes[whole.len() / 2] ^= 1;
         fs::write(&path, &bytes).unwrap();
-        let damaged = verify(&ctx, &folder.path().join("out")).unwrap().damaged;
+        let damaged = verify(&ctx, &folder.join("out")).unwrap().damaged;
         assert!(damaged.iter().any(|damage| damage.file == name), "{name}: {damaged:?}");
         fs::write(&path, &whole).unwrap();
     }
     // A state of another content is refused, one that is cut is passed over: the stage starts over.
-    let (state, record) = (folder.path().join("out/state/tally.0007.txt"), "out/state/tally.0008.json");
+    let (state, record) = (folder.join("out/state/tally.0007.txt"), "out/state/tally.0008.json");
     let whole = fs::read_to_string(&state).unwrap();
-    fs::remove_file(folder.path().join(record)).unwrap();
-    fs::remove_file(folder.path().join("out/state/tally.0008.txt")).unwrap();
+    fs::remove_file(folder.join(record)).unwrap();
+    fs::remove_file(folder.join("out/state/tally.0008.txt")).unwrap();
     fs::write(&state, whole.replace(&whole[..1], if whole.starts_with('1') { "2" } else { "1" })).unwrap();
-    let refused = run(folder.path(), "out", &ALL).unwrap_err().to_string();
+    let refused = run(&folder, "out", &ALL).unwrap_err().to_string();
     assert!(refused.contains("tally.0007.txt") && refused.contains("not the file"), "{refused}");
     fs::write(&state, &whole[..1]).unwrap();
-    assert_eq!(run(folder.path(), "out", &ALL).unwrap(), [("tally", 8)]);
+    assert_eq!(run(&folder, "out", &ALL).unwrap(), [("tally", 8)]);
     fs::write(&state, &whole).unwrap();
-    run(folder.path(), "whole", &ALL).unwrap();
-    assert_eq!(differences(folder.path(), "whole", "out"), Vec::<String>::new());
+    run(&folder, "whole", &ALL).unwrap();
+    assert_eq!(differences(&folder, "whole", "out"), Vec::<String>::new());
 }
 
 #[test]
 fn two_runs_never_write_into_one_folder() {
     let _turn = turn();
     let folder = folder();
-    let mut child = another(folder.path());
-    wait_for(&folder.path().join("killed/state/tally.0001.json"), &mut child);
+    let mut child = another(&folder);
+    wait_for(&folder.join("killed/state/tally.0001.json"), &mut child);
     for stages in [&["base"][..], &["objects"], &["tally"], &[]] {
-        let refused = run(folder.path(), "killed", &Asked { stages, ..ALL }).unwrap_err().to_string();
+        let refused = run(&folder, "killed", &Asked { stages, ..ALL }).unwrap_err().to_string();
         assert!(refused.contains("another run"), "{refused}");
     }
     assert!(child.wait().unwrap().success());
-    assert!(run(folder.path(), "killed", &ALL).unwrap().is_empty());
+    assert!(run(&folder, "killed", &ALL).unwrap().is_empty());
 }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use crate::program::{CUBE, answer_to_sigterm, command, complains, works};
+use crate::program::{CUBE, Folder, answer_to_sigterm, command, complains, works};
 use crate::turn;
 use frazil::geometry::{TriMesh, Vec3};
 use frazil::vdb::reading::guard::Guard;
@@ -63,28 +63,28 @@ fn sheet(n: u32) -> TriMesh {
 #[test]
 fn a_signal_is_answered_while_a_body_is_prepared() {
     let _turn = turn();
-    let folder = tempfile::tempdir().unwrap();
-    frazil::io::mesh::write(&folder.path().join("sheet.ply"), &sheet(1200)).unwrap();
+    let folder = Folder::empty();
+    frazil::io::mesh::write(&folder.join("sheet.ply"), &sheet(1200)).unwrap();
     let scene = "[shot]\nframes = \"1-2\"\n[snow]\nground = 0.0\narea = [-0.5, -0.5, 0.5, 0.5]\ndepth = 0.3\n\
                  cell = 0.05\n[[object]]\nfile = \"sheet.ply\"\n";
-    fs::write(folder.path().join("shot.toml"), scene).unwrap();
-    let sent = terminate_all_along(folder.path(), "check shot.toml", Duration::from_millis(600), 5);
+    fs::write(folder.join("shot.toml"), scene).unwrap();
+    let sent = terminate_all_along(&folder, "check shot.toml", Duration::from_millis(600), 5);
     assert!(sent >= 2, "the sheet was prepared before the signals came: {sent}");
 }
 
 #[test]
 fn a_signal_is_answered_while_a_shot_reads_its_own_files() {
     let _turn = turn();
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
+    let folder = Folder::empty();
+    fs::write(folder.join("cube.obj"), CUBE).unwrap();
     let scene = "[shot]\nframes = \"1-2\"\n[snow]\nground = 0.0\narea = [-4, -4, 4, 4]\ndepth = 0.3\ncell = 0.008\n\
                  [[object]]\nfile = \"cube.obj\"\n";
-    fs::write(folder.path().join("shot.toml"), scene).unwrap();
-    works(folder.path(), "snow shot.toml -o out -q --frames 1");
+    fs::write(folder.join("shot.toml"), scene).unwrap();
+    works(&folder, "snow shot.toml -o out -q --frames 1");
     // The second frame continues from the first one's file.
-    let sent = terminate_all_along(folder.path(), "snow shot.toml -o out -q", Duration::from_millis(250), 6);
+    let sent = terminate_all_along(&folder, "snow shot.toml -o out -q", Duration::from_millis(250), 6);
     assert!(sent >= 2, "the layer was read before the signals came: {sent}");
-    works(folder.path(), "check out");
+    works(&folder, "check out");
 }
 
 /// Starts the program, sends it SIGTERM after a while, and waits for it.
@@ -100,12 +100,12 @@ fn interrupted(folder: &Path, arguments: &str, after: Duration) -> (Output, Dura
 #[test]
 fn a_signal_is_answered_while_a_file_is_read() {
     let _turn = turn();
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let mut text = String::new();
     (0..6_000_000).for_each(|i| text += &format!("v {i} 0 0\n"));
     text += "f 1 2 3\n";
-    fs::write(folder.path().join("large.obj"), text).unwrap();
-    let (output, waited) = interrupted(folder.path(), "info large.obj", Duration::from_millis(400));
+    fs::write(folder.join("large.obj"), text).unwrap();
+    let (output, waited) = interrupted(&folder, "info large.obj", Duration::from_millis(400));
     assert!(waited < Duration::from_secs(1), "{waited:?}");
     complains(&output, 143, &["terminated"]);
 }
@@ -113,10 +113,10 @@ fn a_signal_is_answered_while_a_file_is_read() {
 #[test]
 fn a_cancel_ends_a_decoder_that_hangs() {
     let _turn = turn();
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
-    works(folder.path(), "vdb from-mesh cube.obj --cell 0.02 -o cube.vdb");
-    let program = folder.path().join("program");
+    let folder = Folder::empty();
+    fs::write(folder.join("cube.obj"), CUBE).unwrap();
+    works(&folder, "vdb from-mesh cube.obj --cell 0.02 -o cube.vdb");
+    let program = folder.join("program");
     fs::write(&program, "#!/bin/sh\nexec sleep 100\n").unwrap();
     fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
     let guard = Guard { program, memory: u64::MAX, threads: 2, cancel: Arc::default() };
@@ -126,7 +126,7 @@ fn a_cancel_ends_a_decoder_that_hangs() {
         std::thread::sleep(Duration::from_millis(300));
         cancel.store(true, Ordering::Relaxed);
     });
-    let path = folder.path().join("cube.vdb");
+    let path = folder.join("cube.vdb");
     assert!(matches!(guard.describe(&path), Err(frazil::Error::Cancelled)));
     assert!(start.elapsed() < Duration::from_secs(1), "{:?}", start.elapsed());
 }

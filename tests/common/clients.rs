@@ -69,7 +69,7 @@ pub fn reads_particles(python: &Path, file: &Path, records: &Path) -> Result<Str
     run(command)
 }
 
-/// As [`reads_particles`], of a .vdb file, with tests/ctest/particle_reader.cpp, in the order of the identities.
+/// As [`reads_particles`], of a .vdb file, with tests/ctest/full/particle_reader.cpp, in the order of the identities.
 pub fn reads_vdb_particles(program: &Path, file: &Path, records: &Path) -> Result<String, String> {
     let mut command = Command::new(program);
     command.arg(file).arg(records);

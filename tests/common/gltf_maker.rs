@@ -1,10 +1,9 @@
 //! glTF files made by code.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use tempfile::TempDir;
 
 /// A glTF file in the making: its JSON and its one buffer.
 pub struct Maker {
@@ -112,8 +111,8 @@ impl Maker {
     }
 
     /// Writes it as `made.glb`.
-    pub fn write(&self, folder: &TempDir) -> PathBuf {
-        let path = folder.path().join("made.glb");
+    pub fn write(&self, folder: impl AsRef<Path>) -> PathBuf {
+        let path = folder.as_ref().join("made.glb");
         fs::write(&path, self.glb()).unwrap();
         path
     }

@@ -49,11 +49,11 @@ pub fn struct_writers() -> BTreeSet<String> {
     writers
 }
 
-/// Functions without a text, or that no program of tests/ctest or tests/ctest_core calls.
+/// Functions without a text, or that no program of tests/ctest calls.
 pub fn bare_functions() -> Vec<String> {
     let mut called = BTreeSet::new();
-    for folder in ["tests/ctest", "tests/ctest_core"] {
-        add_words(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut called);
+    for folder in ["common", "full", "core"] {
+        add_words(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/ctest").join(folder), &mut called);
     }
     let bare = |(name, text): &(String, String)| text.trim().len() < 40 || !called.contains(name);
     functions().into_iter().filter(bare).map(|(name, _)| name).collect()

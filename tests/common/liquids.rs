@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use frazil::geometry::points::{Attribute, Column, Points, Values};
 use frazil::geometry::{DVec3, TriMesh};
-use frazil::io::{mesh, particles};
+use frazil::io::mesh;
 use frazil::surface::{Implicit, Isosurface, Params, Particles, SUPPORT, Tracker};
 use frazil::{Context, Pool};
 
+use super::followed::write_numbered;
 use super::shapes::sphere;
 
 /// A context with threads of its own.
@@ -17,7 +17,12 @@ pub fn context(threads: usize) -> Context {
 
 /// The surface of particles at these positions (m) with cells of half a spacing (m), as the tracker has it.
 pub fn own_surface(ctx: &Context, positions: &[DVec3], spacing: f64) -> TriMesh {
-    let phi = Implicit::new(ctx, positions, spacing, 0.5 * spacing).expect("a surface");
+    surface_on(ctx, positions, spacing, 0.5)
+}
+
+/// The surface of particles at these positions (m) on cells of an edge (spacings).
+pub fn surface_on(ctx: &Context, positions: &[DVec3], spacing: f64, cell: f64) -> TriMesh {
+    let phi = Implicit::new(ctx, positions, spacing, cell * spacing).expect("a surface");
     Isosurface::new(&phi).mesh(&phi)
 }
 
@@ -169,10 +174,7 @@ pub fn write_cache(folder: &Path, name: &str, ball: &Ball, frames: i32) {
     for frame in 1..=frames {
         let by = DVec3::new(0.002, -0.001, 0.0) * f64::from(frame - 1);
         let positions: Vec<DVec3> = ball.positions.iter().map(|position| position + by).collect();
-        let mut points = Points::at(1.0, &positions).expect("points");
-        let ids = Values::Long(Column::Each((0..positions.len() as i64).collect()));
-        points.attributes.push(Attribute { name: "id".into(), values: ids });
-        particles::write(&folder.join(format!("{name}.{frame:04}.bgeo")), &points, false).expect("a file");
+        write_numbered(&folder.join(format!("{name}.{frame:04}.bgeo")), &positions, 0);
     }
     mesh::write(&folder.join(format!("{name}.ply")), &ball.mesh).expect("a file");
 }

@@ -26,7 +26,7 @@ pub fn distances(surface: &TriMesh, positions: &[Vec3], reach: f64) -> Vec<f64> 
 }
 
 /// The position of a triangle that is nearest to a point: its own if that is above it, else the nearest one of its edges.
-fn closest(p: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
+pub fn closest(p: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
     let normal = (b - a).cross(&(c - a));
     let is_inside = [(a, b), (b, c), (c, a)].iter().all(|(u, v)| normal.cross(&(v - u)).dot(&(p - u)) >= 0.0);
     if is_inside && normal.norm_squared() > 0.0 {

@@ -36,6 +36,17 @@ impl Turn {
     /// Mirrored along x, along z, and over both diagonals.
     pub const MIRRORS: [Self; 4] =
         [Self::of(true, 0), Self::of(true, 2), Self::of(true, 1), Self::of(true, 3)];
+    /// All of them, the one that changes nothing first.
+    pub const ALL: [Self; 8] = [
+        Self::NONE,
+        Self::TURNS[0],
+        Self::TURNS[1],
+        Self::TURNS[2],
+        Self::MIRRORS[0],
+        Self::MIRRORS[1],
+        Self::MIRRORS[2],
+        Self::MIRRORS[3],
+    ];
 
     const fn of(mirrored: bool, quarters: usize) -> Self {
         Self { mirrored, quarters }

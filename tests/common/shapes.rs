@@ -65,6 +65,14 @@ fn exact(value: f32, index: usize, n: usize) -> f32 {
     }
 }
 
+/// Squares with count * count corners, which are where a function of their index, row by row, says.
+pub fn squares(count: u32, position: impl Fn(u32) -> Vec3) -> TriMesh {
+    let is_square = |index: &u32| index % count + 1 < count && index / count + 1 < count;
+    let square = |a: u32| [[a, a + count, a + count + 1], [a, a + count + 1, a + 1]];
+    let triangles = (0..count * count).filter(is_square).flat_map(square).collect();
+    TriMesh { positions: (0..count * count).map(position).collect(), triangles }
+}
+
 /// A mesh in which vertices at one position are the same: closed by index where its faces share their rims.
 pub fn welded(mesh: &TriMesh) -> TriMesh {
     let same = coincident(mesh.positions.iter().map(|position| position.cast()));

@@ -7,21 +7,23 @@ use std::ptr::null_mut;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
+use frazil::capi::frz_status;
 use frazil::capi::grid::bytes::*;
 use frazil::capi::grid::sparse::*;
 use frazil::capi::level_set::body::frz_body;
 use frazil::capi::runtime::context::*;
 use frazil::capi::snow::base_layer::*;
-use frazil::capi::{frz_status, frz_view};
 use frazil::geometry::DVec3;
 use frazil::motion::Motion;
 use frazil::snow::base_layer::BaseLayer;
 use frazil::sweep::Body;
 
 use crate::capi::cancel_latency::latency;
-use crate::capi::host::{Threads, view, works, written};
+use crate::capi::host::{Threads, body_between, sized, works, written};
 use crate::harness::{Harness, median, timed};
+use crate::process::said;
 use crate::scenes::{self, FRAMES, context};
+use crate::snow::grains::Random;
 
 /// A body's poses in 32 bits at whole frames, as a host has them.
 struct Poses {
@@ -40,21 +42,8 @@ impl Poses {
     }
 
     fn body(&self, frame: i32) -> frz_body {
-        let pose = |frame: i32| view(&self.frames[frame as usize]);
-        frz_body {
-            struct_size: size_of::<frz_body>() as u32,
-            flags: 0,
-            id: 1,
-            positions: pose((frame - 1).max(0)),
-            positions_end: pose(frame),
-            between: std::ptr::null(),
-            between_count: 0,
-            face_counts: frz_view { data: std::ptr::null(), count: 0, stride: 0 },
-            indices: view(self.triangles.as_flattened()),
-            friction: 0.3,
-            stick: 0.0,
-            compression: 0.0,
-        }
+        let pose = |frame: i32| self.frames[frame as usize].as_slice();
+        body_between([pose((frame - 1).max(0)), pose(frame)], &self.triangles)
     }
 }
 
@@ -161,9 +150,7 @@ impl Host {
     }
 
     fn voxels(&self) -> u64 {
-        // SAFETY: plain numbers, of which zero is a value.
-        let mut info: frz_grid_info = unsafe { std::mem::zeroed() };
-        info.struct_size = size_of::<frz_grid_info>() as u32;
+        let mut info: frz_grid_info = sized();
         // SAFETY: the pointers are valid.
         unsafe { works(frz_grid_get_info(frz_base_grid(self.base), &mut info)) };
         info.active_voxels
@@ -193,9 +180,7 @@ pub fn run(h: &mut Harness) {
     if h.wants("capi.state") {
         state(h);
     }
-    if h.wants("capi.border") {
-        border(h);
-    }
+    h.measure("capi.border_cost", border);
     programs(h);
 }
 
@@ -208,12 +193,11 @@ fn cancel(h: &mut Harness) {
     let (whole, _) = timed(|| works(host.step(2)));
     let after = host.bytes();
     host.restore(&state);
-    let mut random = 42u64;
+    let mut random = Random(42);
     let mut latencies = Vec::new();
     let mut same = true;
     for attempt in 0..200 {
-        random = random.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        let moment = Duration::from_secs_f64(whole * (random >> 33) as f64 / (1u64 << 31) as f64);
+        let moment = Duration::from_secs_f64(whole * random.next());
         match if attempt % 2 == 0 {
             latency(&host.threads, moment, || host.step(2))
         } else {
@@ -298,7 +282,7 @@ fn measure(h: &mut Harness, host: &Host, name: &str, note: &str) {
 }
 
 /// Steps of `small` through C over the same steps in Rust, in turn.
-fn border(h: &mut Harness) {
+fn border() -> (f64, String) {
     let ctx = context(2);
     let (layer, body) = scenes::small(&ctx, 2.0);
     let params = *layer.params();
@@ -338,71 +322,42 @@ fn border(h: &mut Harness) {
     }
     let (c, rust) = (median(through_c), median(in_rust));
     let note = format!("threads=2, {} frames in {c:.4} s through C, in {rust:.4} s in Rust", FRAMES - 1);
-    h.gate("capi.border_cost", c / rust, &note);
+    (c / rust, note)
 }
 
-/// What a program of tests/ctest says; none when it was not built. The C library keeps one heap for all of its
+/// What a program of tests/ctest says; nothing when it was not built. The C library keeps one heap for all of its
 /// threads: with one for each, what stays resident depends on which thread came by which, more than on what is kept.
-fn said(program: &str, arguments: &[&str]) -> Option<(bool, String)> {
+fn host_says(program: &str, arguments: &[&str]) -> String {
     let folder = built("ctest");
-    let mut command = Command::new(folder.join(program));
-    command.env("MALLOC_ARENA_MAX", "1").args(arguments).current_dir(folder);
-    let output = command.output().ok()?;
-    Some((output.status.success(), String::from_utf8_lossy(&output.stdout).into_owned()))
+    said(Command::new(folder.join(program)).env("MALLOC_ARENA_MAX", "1").args(arguments).current_dir(folder))
 }
 
-fn number_after(text: &str, word: &str) -> Option<f64> {
-    text.split_whitespace().skip_while(|part| *part != word).nth(1)?.parse().ok()
+/// The number after a word; infinity without it.
+fn number_after(text: &str, word: &str) -> f64 {
+    let number = text.split_whitespace().skip_while(|part| *part != word).nth(1);
+    number.and_then(|number| number.parse().ok()).unwrap_or(f64::INFINITY)
 }
 
 /// Gates that are programs of their own, linked with the installed library.
 fn programs(h: &mut Harness) {
-    let none = "not built: make gates does it";
-    if h.wants("capi.fake_host") {
-        let runs = ["fake_host", "fake_host_static", "fake_host_pkgconfig"].map(|program| said(program, &[]));
-        let all = runs.iter().all(|run| run.as_ref().is_some_and(|(worked, _)| *worked));
-        h.holds(
-            "capi.fake_host",
-            all,
-            "frames 1 2 3 9 4, two nodes, random cancels; shared, static, pkg-config",
-        );
-    }
-    if h.wants("capi.load") {
-        let (_, text) = said("load_cycles", &[]).unwrap_or_default();
-        let threads = number_after(&text, "threads").unwrap_or(f64::INFINITY);
-        let kilobytes = number_after(&text, "memory_kB").unwrap_or(f64::INFINITY);
-        h.gate("capi.load_threads", threads, "100 cycles");
+    h.measure_all(["capi.load_threads", "capi.load_memory"], || {
+        let text = host_says("load_cycles", &[]);
         let note = "100 cycles, growth from the 10th on, in one heap";
-        h.gate("capi.load_memory", kilobytes / 1024.0, note);
-    }
-    if h.wants("capi.symbols") {
+        [(number_after(&text, "threads"), "100 cycles"), (number_after(&text, "memory_kB") / 1024.0, note)]
+    });
+    h.measure("capi.symbols", || {
         let library = built("install/lib/libfrazil.so");
-        let output = Command::new("nm").args(["-D", "--defined-only"]).arg(&library).output();
-        let text =
-            output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
+        let text = said(Command::new("nm").args(["-D", "--defined-only"]).arg(&library));
         let names = text.lines().filter_map(|line| line.split_whitespace().last());
         let (ours, others): (Vec<&str>, Vec<&str>) = names.partition(|name| name.starts_with("frz_"));
         let count = if ours.is_empty() { f64::INFINITY } else { others.len() as f64 };
-        let note = format!("{} functions", ours.len());
-        h.gate("capi.symbols", count, &note);
-    }
-    if h.wants("capi.unused") {
-        let bare = crate::common::header::bare_functions();
-        let note = if bare.is_empty() { String::new() } else { bare.join(" ") };
-        h.gate("capi.unused", bare.len() as f64, &note);
-    }
-    if h.wants("capi.misuse") {
-        let (_, text) = said("misuse", &["100000", "20261121"]).unwrap_or_default();
-        let crashes = number_after(&text, "crashes").unwrap_or(f64::INFINITY);
-        h.gate("capi.misuse_crashes", crashes, "100000 calls");
-    }
-    if h.wants("capi.sanitizers") {
+        (count, format!("{} functions", ours.len()))
+    });
+    h.measure("capi.misuse_crashes", || {
+        (number_after(&host_says("misuse", &["100000", "20261121"]), "crashes"), "100000 calls")
+    });
+    h.measure("capi.sanitizers_errors", || {
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/sanitize");
-        let text = Command::new(script).output();
-        let text =
-            text.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
-        let errors = number_after(&text, "errors").unwrap_or(f64::INFINITY);
-        let note = if errors.is_finite() { "ASan, UBSan, valgrind" } else { none };
-        h.gate("capi.sanitizers_errors", errors, note);
-    }
+        (number_after(&said(&mut Command::new(script)), "errors"), "ASan, UBSan, valgrind")
+    });
 }

@@ -3,22 +3,19 @@
 use std::ptr::{null, null_mut};
 use std::time::{Duration, Instant};
 
+use frazil::capi::frz_status;
 use frazil::capi::grid::bytes::*;
 use frazil::capi::grid::sparse::*;
 use frazil::capi::level_set::body::frz_body;
 use frazil::capi::level_set::tools::*;
 use frazil::capi::mesh::triangles::*;
 use frazil::capi::runtime::context::*;
-use frazil::capi::runtime::library::FRZ_ABI_VERSION;
-use frazil::capi::runtime::pool::*;
 use frazil::capi::snow::base_layer::*;
 use frazil::capi::snow::layer::*;
-use frazil::capi::{frz_status, frz_view};
-use frazil::geometry::TriMesh;
 
-use crate::capi::host::{view, works};
+use crate::capi::host::{Threads, body_between, mesh, usual, view, works, written};
 use crate::common::shapes;
-use crate::harness::Harness;
+use crate::snow::grains::Random;
 
 /// Rounds for each function.
 const ROUNDS: usize = 2000;
@@ -46,15 +43,15 @@ const FUNCTIONS: [Function; 8] = [
     Function { name: "displace", call: Host::displace, before: Host::snow_bytes },
 ];
 
-/// Two contexts on one pool: one that is cancelled, and one that makes and looks.
+/// Two contexts: one that is cancelled, and one that makes and looks.
 struct Host {
-    pool: *mut frz_pool,
-    cancelled: *mut frz_context,
-    calm: *mut frz_context,
+    cancelled: Threads,
+    calm: Threads,
     snow: *mut frz_grid,
     mesh: *mut frz_mesh,
-    ball: TriMesh,
-    ball_end: Vec<[f32; 3]>,
+    /// A ball before and after a step, and its triangles.
+    ball: [Vec<[f32; 3]>; 2],
+    triangles: Vec<[u32; 3]>,
     centres: Vec<[f32; 3]>,
     radii: Vec<f32>,
 }
@@ -63,45 +60,28 @@ impl Host {
     fn new() -> Self {
         let mut ball = shapes::sphere(0.15, 8);
         ball.positions.iter_mut().for_each(|p| p.y += 0.3);
-        let moved = |p: &frazil::geometry::Vec3| [p.x + 0.1, p.y - 0.05, p.z + 0.05];
+        let at =
+            |by: [f32; 3]| ball.positions.iter().map(|p| [p.x + by[0], p.y + by[1], p.z + by[2]]).collect();
         let spread = |n: usize, step: usize| (n * step % 97) as f32 / 97.0;
         let mut host = Self {
-            pool: null_mut(),
-            cancelled: null_mut(),
-            calm: null_mut(),
+            cancelled: Threads::new(2),
+            calm: Threads::new(2),
             snow: null_mut(),
             mesh: null_mut(),
-            ball_end: ball.positions.iter().map(moved).collect(),
-            ball,
+            ball: [at([0.0; 3]), at([0.1, -0.05, 0.05])],
+            triangles: ball.triangles.clone(),
             centres: (0..60).map(|n| [spread(n, 13), spread(n, 29), spread(n, 53)]).collect(),
             radii: (0..60).map(|n| 0.08 + 0.08 * spread(n, 71)).collect(),
         };
-        // SAFETY: the pointers are valid, and the arrays outlive the host.
-        unsafe {
-            works(frz_pool_create(2, &mut host.pool));
-            works(frz_context_create(FRZ_ABI_VERSION, host.pool, &mut host.cancelled));
-            works(frz_context_create(FRZ_ABI_VERSION, host.pool, &mut host.calm));
-            works(frz_snow_layer(host.calm, &host.layer(), &mut host.snow));
-            let desc = frz_mesh_desc {
-                struct_size: size_of::<frz_mesh_desc>() as u32,
-                flags: 0,
-                positions: view(&host.ball.positions),
-                face_counts: frz_view { data: null(), count: 0, stride: 0 },
-                indices: view(host.ball.triangles.as_flattened()),
-                attributes: null(),
-                attribute_count: 0,
-            };
-            works(frz_mesh_create(host.calm, &desc, &mut host.mesh));
-        }
+        // SAFETY: the pointers are valid.
+        unsafe { works(frz_snow_layer(host.calm.ctx, &host.layer(), &mut host.snow)) };
+        host.mesh = mesh(host.calm.ctx, &host.ball[0], &host.triangles);
         host
     }
 
     /// A small layer.
     fn layer(&self) -> frz_snow_desc {
-        // SAFETY: plain numbers and pointers, of which zero is a value.
-        let mut desc: frz_snow_desc = unsafe { std::mem::zeroed() };
-        // SAFETY: it has its size.
-        works(unsafe { frz_snow_desc_init(&mut desc, size_of::<frz_snow_desc>()) });
+        let mut desc = usual(frz_snow_desc_init);
         desc.voxel_size = VOXEL;
         desc.depth = 0.2;
         desc.area = [-0.3, -0.3, 0.3, 0.3];
@@ -109,20 +89,7 @@ impl Host {
     }
 
     fn body(&self) -> frz_body {
-        frz_body {
-            struct_size: size_of::<frz_body>() as u32,
-            flags: 0,
-            id: 1,
-            positions: view(&self.ball.positions),
-            positions_end: view(&self.ball_end),
-            between: null(),
-            between_count: 0,
-            face_counts: frz_view { data: null(), count: 0, stride: 0 },
-            indices: view(self.ball.triangles.as_flattened()),
-            friction: 0.3,
-            stick: 0.0,
-            compression: 0.0,
-        }
+        body_between(self.ball.each_ref().map(Vec::as_slice), &self.triangles)
     }
 
     fn nothing(&self) -> Vec<u8> {
@@ -143,23 +110,16 @@ impl Host {
 
     fn bytes(&self, grids: &[*const frz_grid]) -> Vec<u8> {
         let none = frz_compression::FRZ_COMPRESSION_NONE as u32;
-        let (list, count) = (grids.as_ptr(), grids.len());
-        let mut size = 0;
-        // SAFETY: the pointers are valid, and the room is as large as the call before said.
-        unsafe {
-            works(frz_grid_to_bytes(self.calm, list, count, none, 0, null_mut(), 0, &mut size));
-            let mut out = vec![0u8; size];
-            let room = out.as_mut_ptr().cast();
-            works(frz_grid_to_bytes(self.calm, list, count, none, 0, room, size, &mut size));
-            out.truncate(size);
-            out
-        }
+        // SAFETY: the pointers are valid.
+        written(|room, capacity, size| unsafe {
+            frz_grid_to_bytes(self.calm.ctx, grids.as_ptr(), grids.len(), none, 0, room, capacity, size)
+        })
     }
 
     fn base(&self) -> *mut frz_base {
         let mut base = null_mut();
         // SAFETY: the pointers are valid.
-        works(unsafe { frz_base_create(self.calm, null(), self.snow, null(), 0, &mut base) });
+        works(unsafe { frz_base_create(self.calm.ctx, null(), self.snow, null(), 0, &mut base) });
         base
     }
 
@@ -193,7 +153,7 @@ impl Host {
         self.made(|out| {
             // SAFETY: the pointers are valid.
             unsafe {
-                works(frz_grid_copy(self.calm, self.snow, out));
+                works(frz_grid_copy(self.calm.ctx, self.snow, out));
                 change(*out)
             }
         })
@@ -246,9 +206,6 @@ impl Drop for Host {
         unsafe {
             frz_mesh_destroy(self.mesh);
             frz_grid_destroy(self.snow);
-            frz_context_destroy(self.cancelled);
-            frz_context_destroy(self.calm);
-            frz_pool_destroy(self.pool);
         }
     }
 }
@@ -265,18 +222,18 @@ struct Counts {
 }
 
 /// Cancels and resets during calls of a function, at random moments.
-fn rounds(host: &Host, function: &Function, random: &mut impl FnMut() -> f64) -> Counts {
-    let (status, whole) = (function.call)(host, host.calm);
+fn rounds(host: &Host, function: &Function, random: &mut Random) -> Counts {
+    let (status, whole) = (function.call)(host, host.calm.ctx);
     works(status);
     let before = (function.before)(host);
     assert_ne!(whole, before, "{}", function.name);
     let start = Instant::now();
-    (0..5).for_each(|_| drop((function.call)(host, host.calm)));
+    (0..5).for_each(|_| drop((function.call)(host, host.calm.ctx)));
     let most = start.elapsed() / 5;
     let mut counts = Counts::default();
     for _ in 0..ROUNDS {
-        let [moment, hold] = [most.mul_f64(random()), Duration::from_secs_f64(20e-6 * random())];
-        let ctx = host.cancelled as usize;
+        let [moment, hold] = [most.mul_f64(random.next()), Duration::from_secs_f64(20e-6 * random.next())];
+        let ctx = host.cancelled.ctx as usize;
         let canceller = std::thread::spawn(move || {
             let ctx = ctx as *mut frz_context;
             spin(moment);
@@ -286,7 +243,7 @@ fn rounds(host: &Host, function: &Function, random: &mut impl FnMut() -> f64) ->
             // SAFETY: as above.
             unsafe { frz_context_reset(ctx) };
         });
-        let (status, bytes) = (function.call)(host, host.cancelled);
+        let (status, bytes) = (function.call)(host, host.cancelled.ctx);
         canceller.join().expect("the thread");
         if status == frz_status::FRZ_CANCELLED {
             counts.cancelled += 1;
@@ -309,16 +266,9 @@ fn spin(time: Duration) {
 }
 
 /// Runs the gates.
-pub fn run(h: &mut Harness) {
-    if !h.wants("reliability.cancel_reset") {
-        return;
-    }
+pub fn measure() -> [(f64, String); 2] {
     let host = Host::new();
-    let mut state = 42u64;
-    let mut random = || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 33) as f64 / (1u64 << 31) as f64
-    };
+    let mut random = Random(42);
     let (mut wrong, mut changed, mut notes) = (0, 0, Vec::new());
     for function in &FUNCTIONS {
         let counts = rounds(&host, function, &mut random);
@@ -327,10 +277,5 @@ pub fn run(h: &mut Harness) {
         notes.push(format!("{} {}+{}", function.name, counts.done, counts.cancelled));
     }
     let note = format!("{ROUNDS} rounds each, done + cancelled: {}", notes.join(", "));
-    h.gate("reliability.cancel_reset", wrong as f64, &note);
-    h.gate(
-        "reliability.cancel_reset_changed",
-        changed as f64,
-        "FRZ_CANCELLED with something made or changed",
-    );
+    [(wrong as f64, note), (changed as f64, "FRZ_CANCELLED with something made or changed".into())]
 }

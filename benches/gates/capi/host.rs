@@ -4,6 +4,8 @@
 use std::ffi::{CStr, c_void};
 use std::ptr::null_mut;
 
+use frazil::capi::level_set::body::{frz_body, frz_body_init};
+use frazil::capi::mesh::triangles::*;
 use frazil::capi::runtime::context::*;
 use frazil::capi::runtime::library::{FRZ_ABI_VERSION, frz_last_error};
 use frazil::capi::runtime::pool::*;
@@ -47,6 +49,42 @@ pub fn works(status: frz_status) {
     // SAFETY: the text ends with a zero.
     let said = unsafe { CStr::from_ptr(frz_last_error()) };
     assert_eq!(status, frz_status::FRZ_OK, "{said:?}");
+}
+
+/// A struct of zeroes that begins with its size.
+pub fn sized<T>() -> T {
+    // SAFETY: structs of the interface are numbers and pointers, of which zero is a value.
+    let mut out: T = unsafe { std::mem::zeroed() };
+    // SAFETY: they begin with their size.
+    unsafe { (&raw mut out).cast::<u32>().write(size_of::<T>() as u32) };
+    out
+}
+
+/// A struct with the defaults that a function fills in.
+pub fn usual<T>(init: unsafe extern "C" fn(*mut T, usize) -> frz_status) -> T {
+    let mut out = sized();
+    // SAFETY: the struct is there, and has this size.
+    works(unsafe { init(&mut out, size_of::<T>()) });
+    out
+}
+
+/// A body that goes from one pose to another; both, and the triangles, must outlive it.
+pub fn body_between([from, to]: [&[[f32; 3]]; 2], triangles: &[[u32; 3]]) -> frz_body {
+    let mut body = usual(frz_body_init);
+    body.id = 1;
+    (body.positions, body.positions_end) = (view(from), view(to));
+    body.indices = view(triangles.as_flattened());
+    body
+}
+
+/// A mesh, which is to be destroyed.
+pub fn mesh(ctx: *mut frz_context, positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> *mut frz_mesh {
+    let mut desc: frz_mesh_desc = sized();
+    (desc.positions, desc.indices) = (view(positions), view(triangles.as_flattened()));
+    let mut mesh = null_mut();
+    // SAFETY: the pointers are valid.
+    unsafe { works(frz_mesh_create(ctx, &desc, &mut mesh)) };
+    mesh
 }
 
 pub fn view<T>(elements: &[T]) -> frz_view {

@@ -1,10 +1,10 @@
 //! Gate of the small inputs in `bugs/` of the outside data: each failed once, and its README says what must come out.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use crate::common::character;
 use crate::harness::Harness;
+use crate::process;
 
 /// Volumes are right within this part.
 const CLOSE: f64 = 0.02;
@@ -136,8 +136,7 @@ impl Bugs {
     }
 
     fn frazil(&self, arguments: &[&str]) -> Said {
-        let output =
-            Command::new(env!("CARGO_BIN_EXE_frazil")).args(arguments).output().expect("the program");
+        let output = process::frazil(arguments).output().expect("frazil");
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
         Said {
             code: output.status.code().unwrap_or(255),
@@ -283,17 +282,8 @@ impl Bugs {
             std::fs::create_dir_all(&out).expect("a folder");
             let particles = self.path(&format!("14-empty-frames/{kind}/p.%04d.bgeo"));
             let meshes = out.join("m.%04d.ply").display().to_string();
-            let arguments = [
-                "vdb",
-                "from-particles",
-                &particles,
-                "--frames",
-                "1-20",
-                "--spacing",
-                "0.1",
-                "--mesh",
-                &meshes,
-            ];
+            let by = ["--frames", "1-20", "--spacing", "0.1"];
+            let arguments = [&["vdb", "from-particles", &particles, "--mesh", &meshes], &by[..]].concat();
             self.frazil(&arguments).is_done() && count(&out) == 20
         })
     }

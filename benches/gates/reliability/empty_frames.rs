@@ -1,16 +1,14 @@
 //! Frames of sequences that are empty or missing: every frame that can be made is made, and is empty where its input is.
 
 use std::path::Path;
-use std::process::Command;
 
 use frazil::geometry::points::{Column, Points, Values};
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::io::{mesh, particles};
 
 use crate::common::bodies::Dice;
-use crate::harness::Harness;
+use crate::process::{self, quiet};
 
-const NAME: &str = "reliability.empty_frames";
 /// Frames of a sequence, and patterns of them.
 const FRAMES: usize = 8;
 const PATTERNS: usize = 12;
@@ -30,10 +28,7 @@ struct Count {
     all: usize,
 }
 
-pub fn run(h: &mut Harness) {
-    if !h.wants(NAME) {
-        return;
-    }
+pub fn measure() -> (f64, String) {
     let folder = std::env::temp_dir().join(format!("frazil-empty-frames-{}", std::process::id()));
     let mut count = Count::default();
     for (n, pattern) in patterns().iter().enumerate() {
@@ -46,7 +41,7 @@ pub fn run(h: &mut Harness) {
     }
     let _ = std::fs::remove_dir_all(folder);
     let note = format!("of {} frames of {PATTERNS} patterns in 7 stages", count.all);
-    h.gate(NAME, count.lost as f64, &note);
+    (count.lost as f64, note)
 }
 
 /// Emitters, drains, what comes back, gaps, and any.
@@ -90,9 +85,7 @@ fn write(folder: &Path, number: usize, frame: Frame) {
 
 /// Whether the command worked.
 fn frazil(folder: &Path, arguments: &str) -> bool {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_frazil"));
-    let output = command.current_dir(folder).args(arguments.split(' ')).output().expect("frazil");
-    output.status.success()
+    quiet(process::frazil(arguments.split(' ')).current_dir(folder)).status().expect("frazil").success()
 }
 
 /// Stages in which each frame is made by itself.

@@ -6,7 +6,6 @@
 
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::Command;
 use std::time::Instant;
 
 use frazil::geometry::{DVec3, TriMesh};
@@ -16,10 +15,8 @@ use serde_json::Value;
 
 use crate::common::bodies::Dice;
 use crate::common::soups::{Solid, solids, volume_inside};
-use crate::harness::Harness;
+use crate::process::frazil;
 
-const SILENT: &str = "reliability.soup_silent";
-const WARNED: &str = "reliability.soup_warned";
 /// Distances from the origin, and sizes at which rounding there is below a thousandth (m).
 const AT: [(f64, f64); 4] = [(0.0, 1.0), (100.0, 1.0), (1.0e4, 4.0), (9.99e4, 40.0)];
 /// Cells across a body.
@@ -30,10 +27,7 @@ const HALF_AREA: f64 = 0.787;
 /// Errors of a volume that count (share).
 const OFF: f64 = 0.01;
 
-pub fn run(h: &mut Harness) {
-    if !h.wants("reliability.soup") {
-        return;
-    }
+pub fn measure() -> [(f64, String); 2] {
     let (start, mut dice) = (Instant::now(), Dice(47));
     let folder = tempfile::tempdir().expect("a folder");
     let bodies = solids(&mut dice);
@@ -49,8 +43,7 @@ pub fn run(h: &mut Harness) {
         }
     }
     let note = format!("{} runs, {:.0} s", tally.runs, start.elapsed().as_secs_f64());
-    h.gate(SILENT, tally.silent as f64, &note);
-    h.gate(WARNED, tally.warned as f64, "warnings, errors and reports of faults");
+    [(tally.silent as f64, note), (tally.warned as f64, "warnings, errors and reports of faults".into())]
 }
 
 #[derive(Default)]
@@ -228,9 +221,7 @@ impl Case<'_> {
     }
 
     fn frazil(&self, arguments: &str) -> Said {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_frazil"));
-        let output = command.current_dir(self.folder).args(arguments.split_whitespace()).output();
-        let output = output.expect("the program");
+        let output = frazil(arguments.split_whitespace()).current_dir(self.folder).output().expect("frazil");
         let warnings = String::from_utf8_lossy(&output.stderr);
         // Snow on a rough ground is as thin as the scene asks for.
         let is_of_the_mesh = |line: &&str| line.contains("warn") || line.contains("error");

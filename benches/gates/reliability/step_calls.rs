@@ -1,6 +1,5 @@
 //! Every step function of the C interface with random settings that it accepts: one that takes far longer than others ends when it is cancelled.
 
-use std::mem::zeroed;
 use std::path::{Path, PathBuf};
 use std::ptr::{null, null_mut};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -21,19 +20,10 @@ use frazil::capi::snow::mist::*;
 use frazil::capi::snow::mist_params::*;
 use frazil::capi::snow::mist_points::*;
 
-use crate::capi::host::view;
+use crate::capi::host::{sized, usual, view};
 use crate::harness::Harness;
 use crate::reliability::step_meshes as meshes;
 use crate::reliability::watch::{Judged, PARTS, Tried, Watch};
-
-/// A struct of zeroes that begins with its size.
-pub fn sized<T>() -> T {
-    // SAFETY: structs of the interface are numbers and pointers, of which zero is a value.
-    let mut out: T = unsafe { zeroed() };
-    // SAFETY: they begin with their size.
-    unsafe { (&raw mut out).cast::<u32>().write(size_of::<T>() as u32) };
-    out
-}
 
 /// The gates, one of each function.
 pub fn run(h: &mut Harness) {
@@ -120,10 +110,8 @@ impl Known {
 
 /// Domains, grounds and parameters of shallow liquids.
 fn liquid(tried: &mut Tried) -> (frz_shallow_params, frz_shallow_domain, Vec<f32>) {
-    let mut params: frz_shallow_params = sized();
+    let mut params = usual(frz_shallow_params_init);
     let mut domain: frz_shallow_domain = sized();
-    // SAFETY: the struct is there.
-    unsafe { frz_shallow_params_init(&mut params, size_of::<frz_shallow_params>()) };
     domain.cell = tried.any(1e-4, 1e-1);
     domain.cells = [2 * (2 + tried.below(14)) as u32, 2 * (2 + tried.below(14)) as u32];
     let range = domain.cell * tried.any(1.0, 300.0);
@@ -300,9 +288,7 @@ fn detail(tried: &mut Tried) {
 
 /// Parameters of grains.
 pub fn grain_params(tried: &mut Tried, radius: f64) -> frz_grains_params {
-    let mut params: frz_grains_params = sized();
-    // SAFETY: the struct is there.
-    unsafe { frz_grains_params_init(&mut params, size_of::<frz_grains_params>()) };
+    let mut params = usual(frz_grains_params_init);
     params.radius = radius;
     params.flags = FRZ_GRAINS_FLOOR * u32::from(tried.chance(0.7));
     params.flags |= FRZ_GRAINS_RESTLESS * u32::from(tried.chance(0.3));
@@ -356,9 +342,7 @@ fn grains(tried: &mut Tried) {
 
 /// Parameters of mist.
 pub fn mist_params(tried: &mut Tried, cell: f64) -> frz_mist_params {
-    let mut params: frz_mist_params = sized();
-    // SAFETY: the struct is there.
-    unsafe { frz_mist_params_init(&mut params, size_of::<frz_mist_params>()) };
+    let mut params = usual(frz_mist_params_init);
     params.cell = cell;
     (params.turbulence_size, params.noise_size) = (cell * tried.any(8.0, 100.0), cell * tried.any(1.0, 20.0));
     params.from_speed = tried.any(1e-2, 10.0);

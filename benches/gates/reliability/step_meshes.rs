@@ -1,6 +1,5 @@
 //! Scenes for `step_calls.rs` with meshes and layers of snow.
 
-use std::mem::zeroed;
 use std::ptr::{null, null_mut};
 
 use frazil::capi::frz_span;
@@ -15,71 +14,44 @@ use frazil::capi::snow::mist::*;
 use frazil::capi::tracker::eased::*;
 use frazil::capi::tracker::follower::*;
 use frazil::capi::tracker::mesh::*;
+use frazil::geometry::TriMesh;
 
-use crate::capi::host::{view, works};
-use crate::reliability::step_calls::{grain_params, mist_params, sized, step_length};
+use crate::capi::host::{self, body_between, sized, usual, view, works};
+use crate::reliability::step_calls::{grain_params, mist_params, step_length};
 use crate::reliability::watch::Tried;
-
-/// Corners of a cube of half an edge of 1, and its faces.
-const CORNERS: [[f32; 3]; 8] = [
-    [-1.0, -1.0, -1.0],
-    [1.0, -1.0, -1.0],
-    [-1.0, 1.0, -1.0],
-    [1.0, 1.0, -1.0],
-    [-1.0, -1.0, 1.0],
-    [1.0, -1.0, 1.0],
-    [-1.0, 1.0, 1.0],
-    [1.0, 1.0, 1.0],
-];
-const FACES: [[u32; 3]; 12] = [
-    [0, 2, 1],
-    [1, 2, 3],
-    [4, 5, 6],
-    [5, 7, 6],
-    [0, 1, 4],
-    [1, 5, 4],
-    [2, 6, 3],
-    [3, 6, 7],
-    [0, 4, 2],
-    [2, 4, 6],
-    [1, 3, 5],
-    [3, 7, 5],
-];
 
 /// Voxels of the snow (m), which is 0.4 x 0.1 x 0.4 m.
 const VOXEL: f64 = 0.02;
 
-/// A cube at two moments.
-struct Cube([[[f32; 3]; 8]; 2]);
+/// A cube at two moments, and its triangles.
+struct Cube([Vec<[f32; 3]>; 2], Vec<[u32; 3]>);
 
 impl Cube {
     fn new(tried: &mut Tried) -> Self {
         let half = tried.any(0.02, 0.15) as f32;
         let mut at = || [0; 3].map(|_| tried.between(-0.15, 0.15) as f32);
+        let (corners, faces) = cube(half);
+        let moved = |by: [f32; 3]| corners.iter().map(|p| [0, 1, 2].map(|axis| by[axis] + p[axis])).collect();
         let [from, to] = [at(), at()];
-        Self([from, to].map(|at| CORNERS.map(|corner| [0, 1, 2].map(|axis| at[axis] + half * corner[axis]))))
+        Self([from, to].map(moved), faces)
     }
 
     fn body(&self) -> frz_body {
-        // SAFETY: numbers and pointers, of which zero is a value.
-        let mut body: frz_body = unsafe { zeroed() };
-        // SAFETY: the struct is there.
-        unsafe { works(frz_body_init(&mut body, size_of::<frz_body>())) };
-        body.id = 1;
-        (body.positions, body.positions_end) = (view(&self.0[0]), view(&self.0[1]));
-        body.indices = view(FACES.as_flattened());
-        body
+        body_between(self.0.each_ref().map(Vec::as_slice), &self.1)
     }
 }
 
+/// A cube of half an edge around the origin: its corners and triangles.
+fn cube(half: f32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+    let TriMesh { positions, triangles } = TriMesh::cuboid([-half; 3], [half; 3]);
+    (positions.into_iter().map(Into::into).collect(), triangles)
+}
+
 fn snow(tried: &Tried) -> *mut frz_grid {
-    let (mut desc, mut snow): (frz_snow_desc, _) = (sized(), null_mut());
+    let (mut desc, mut snow) = (usual(frz_snow_desc_init), null_mut());
+    (desc.voxel_size, desc.depth, desc.area) = (VOXEL, 0.1, [-0.2, -0.2, 0.2, 0.2]);
     // SAFETY: the pointers are valid.
-    unsafe {
-        works(frz_snow_desc_init(&mut desc, size_of::<frz_snow_desc>()));
-        (desc.voxel_size, desc.depth, desc.area) = (VOXEL, 0.1, [-0.2, -0.2, 0.2, 0.2]);
-        works(frz_snow_layer(tried.ctx(), &desc, &mut snow));
-    }
+    works(unsafe { frz_snow_layer(tried.ctx(), &desc, &mut snow) });
     snow
 }
 
@@ -104,13 +76,12 @@ fn each_press(
 
 pub fn base(tried: &mut Tried) {
     each_press(tried, 16, |tried, base, body, frame| {
-        let mut params: frz_base_params = sized();
+        let mut params = usual(frz_base_params_init);
         let dt = step_length(tried);
+        params.tolerance = tried.any(1e-3, 1.0);
+        params.noise.amplitude = tried.between(0.0, 3.0) * VOXEL;
         // SAFETY: the pointers are valid.
         unsafe {
-            works(frz_base_params_init(&mut params, size_of::<frz_base_params>()));
-            params.tolerance = tried.any(1e-3, 1.0);
-            params.noise.amplitude = tried.between(0.0, 3.0) * VOXEL;
             frz_base_set_params(base, &params);
             tried.step(|ctx| frz_base_step(ctx, base, body, 1, dt, frame, null_mut()));
         }
@@ -202,9 +173,7 @@ impl Particles {
 }
 
 fn tracker_params(tried: &mut Tried) -> frz_tracker_params {
-    let mut params: frz_tracker_params = sized();
-    // SAFETY: the struct is there.
-    unsafe { works(frz_tracker_params_init(&mut params, size_of::<frz_tracker_params>())) };
+    let mut params = usual(frz_tracker_params_init);
     (params.spacing, params.cell) = (1.0, 0.5);
     params.change = tried.any(1e-3, 100.0);
     params.half_life = if tried.chance(0.5) { f64::INFINITY } else { tried.any(1e-2, 10.0) };
@@ -221,14 +190,11 @@ fn each_tracker(tried: &mut Tried, frame: impl Fn(&mut Tried, *mut frz_tracker, 
     params.rebuild = rebuild;
     let cell = tried.between(0.3, 1.0);
     params.cell = cell;
-    let mut desc: frz_mesh_desc = sized();
-    let corners = CORNERS.map(|corner| corner.map(|at| 4.0 * at));
-    (desc.positions, desc.indices) = (view(&corners), view(FACES.as_flattened()));
-    let (mut mesh, mut tracker) = (null_mut(), null_mut());
+    let (corners, faces) = cube(4.0);
+    let (mesh, mut tracker) = (host::mesh(tried.ctx(), &corners, &faces), null_mut());
     let mut now = Particles::new();
     // SAFETY: the pointers are valid, and handles are destroyed once.
     unsafe {
-        works(frz_mesh_create(tried.ctx(), &desc, &mut mesh));
         if frz_tracker_create(tried.ctx(), &params, mesh, &now.given(), null(), 0, &mut tracker) == FRZ_OK {
             for _ in 0..8 {
                 let next = now.moved(tried);

@@ -2,9 +2,8 @@
 //! 2 pi L / (2 g D)^(1/2), at any amplitude; here 2 %, where what pipes leave out, momentum that is carried along, is small.
 
 use crate::common::liquids::context;
-use crate::harness::Harness;
-use crate::plots::chart::{Axis, Plot};
-use crate::shallow::ground::{G, between, depth, dry, ground, pour, viscous};
+use crate::plots::Plot;
+use crate::shallow::ground::{G, between, depth, dry, even, ground, pour, swing, viscous};
 
 /// Radius of the puddle and depth in its middle (m).
 const RADIUS: f64 = 0.1;
@@ -16,10 +15,7 @@ const CELLS: usize = 120;
 const PERIODS: usize = 6;
 const FRAMES: usize = 400;
 
-pub fn run(h: &mut Harness) {
-    if !h.wants("shallow.bowl_period") {
-        return;
-    }
+pub fn measure() -> (f64, String) {
     let ctx = context(0);
     let cell = 3.0 * RADIUS / CELLS as f64;
     let from_middle = |at: [f64; 2]| at.map(|x| x - 1.5 * RADIUS);
@@ -42,27 +38,18 @@ pub fn run(h: &mut Harness) {
     };
     let period = std::f64::consts::TAU * RADIUS / (2.0 * G * DEEP).sqrt();
     let dt = period / FRAMES as f64;
-    let mut positions = vec![[0.0, middle(&shallow)]];
-    for frame in 1..=PERIODS * FRAMES {
-        shallow.step(&ctx, dt).expect("a frame");
-        positions.push([frame as f64 * dt, middle(&shallow)]);
-    }
-    let falls = positions.windows(2).filter(|ends| ends[0][1] > 0.0 && ends[1][1] <= 0.0);
-    let zeros: Vec<f64> =
-        falls.map(|ends| ends[0][0] + dt * ends[0][1] / (ends[0][1] - ends[1][1])).collect();
-    let own = (zeros[zeros.len() - 1] - zeros[0]) / (zeros.len() - 1) as f64;
+    let (positions, own) = swing(&mut shallow, &ctx, dt, PERIODS * FRAMES, middle);
     let last = positions[(PERIODS - 1) * FRAMES..].iter().map(|position| position[1]).fold(0.0, f64::max);
     let first = positions[0][1];
     let note = format!("the last swing is {:.3} of the first", last / first);
-    h.gate("shallow.bowl_period", 100.0 * (own / period - 1.0).abs(), &note);
-    let theory =
-        (0..=600).map(|i| f64::from(i) / 100.0).map(|t| [t, 1e3 * first * (std::f64::consts::TAU * t).cos()]);
-    Plot::new(
+    let theory = even(0.0, 6.0, 600).map(|t| [t, 1e3 * first * (std::f64::consts::TAU * t).cos()]);
+    Plot::linear(
         "Swing in a parabolic bowl (Thacker 1981)",
-        Axis::linear("time (periods of theory)"),
-        Axis::linear("centre of mass (mm)"),
+        "time (periods of theory)",
+        "centre of mass (mm)",
     )
     .line("theory", theory)
     .points("pipes", positions.iter().step_by(FRAMES / 10).map(|[time, x]| [time / period, 1e3 * x]))
     .write("shallow_bowl");
+    (100.0 * (own / period - 1.0).abs(), note)
 }

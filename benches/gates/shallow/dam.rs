@@ -2,9 +2,8 @@
 //! against the equations that pipes do solve, H' + q_x = 0 and q' + g H H_x = 0.
 
 use crate::common::liquids::context;
-use crate::harness::Harness;
-use crate::plots::chart::{Axis, Plot};
-use crate::shallow::ground::{G, between, depth, dry, ground, pour, run_until, viscous};
+use crate::plots::Plot;
+use crate::shallow::ground::{G, between, depth, dry, even, ground, pour, run_until, viscous};
 
 /// Depths behind and before the dam (m).
 const DEEP: f64 = 0.1;
@@ -13,10 +12,7 @@ const CELLS: usize = 1000;
 const CELL: f64 = 2.0e-3;
 const TIME: f64 = 0.6;
 
-pub fn run(h: &mut Harness) {
-    if !h.wants("shallow.dam") {
-        return;
-    }
+pub fn measure() -> [(f64, String); 2] {
     let ctx = context(0);
     let solids = ground([CELLS, 1], CELL, between(0.0, 0.2), |_| 0.0);
     let mut shallow = dry(&ctx, &solids, viscous(0.0));
@@ -33,19 +29,18 @@ pub fn run(h: &mut Harness) {
     let middle = plateau.iter().sum::<f64>() / plateau.len() as f64;
     let off = |own: f64, theory: f64| 100.0 * (own / theory - 1.0);
     let note = |theory: f64| format!("off Stoker; off the pipes' own equations: {theory:.2} %");
-    h.gate("shallow.dam_front", off(front / TIME, stoker.front), &note(off(front / TIME, pipes.front)));
-    h.gate("shallow.dam_depth", off(middle, stoker.depth), &note(off(middle, pipes.depth)));
     let line =
         |theory: &Break| theory.shape().map(|[speed, depth]| [speed * TIME, 1e3 * depth]).collect::<Vec<_>>();
-    Plot::new(
-        "A dam breaks over shallow water, after 0.6 s",
-        Axis::linear("from the dam (m)"),
-        Axis::linear("depth (mm)"),
-    )
-    .line("theory (Stoker 1957)", line(&stoker))
-    .line("theory without carried momentum", line(&pipes))
-    .points("pipes", own.iter().step_by(8).map(|[x, depth]| [*x, 1e3 * depth]))
-    .write("shallow_dam");
+    Plot::linear("A dam breaks over shallow water, after 0.6 s", "from the dam (m)", "depth (mm)")
+        .line("theory (Stoker 1957)", line(&stoker))
+        .line("theory without carried momentum", line(&pipes))
+        .points("pipes", own.iter().step_by(8).map(|[x, depth]| [*x, 1e3 * depth]))
+        .write("shallow_dam");
+    let speed = front / TIME;
+    [
+        (off(speed, stoker.front), note(off(speed, pipes.front))),
+        (off(middle, stoker.depth), note(off(middle, pipes.depth))),
+    ]
 }
 
 /// A dam that has broken: waves that run up into the deep water, a plateau, and a step that runs over the shallow water.
@@ -76,7 +71,7 @@ impl Break {
 
     /// Depths (m) over x / t (m/s).
     fn shape(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
-        let waves = (0..=50).map(|i| DEEP + (self.depth - DEEP) * f64::from(i) / 50.0);
+        let waves = even(DEEP, self.depth, 50);
         let speed = |depth: f64| {
             let along = if self.is_whole { 2.0 * (wave(DEEP) - wave(depth)) } else { 0.0 };
             along - wave(depth)

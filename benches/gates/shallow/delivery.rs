@@ -5,9 +5,8 @@ use frazil::shallow::Params;
 use frazil::shallow::pipes::Border;
 
 use crate::common::liquids::context;
-use crate::harness::Harness;
-use crate::plots::chart::{Axis, Plot};
-use crate::shallow::ground::{G, between, depth, dry, ground, run_until, viscous};
+use crate::plots::Plot;
+use crate::shallow::ground::{G, between, depth, dry, ground, ratios, run_until, viscous};
 
 /// Blood (m2/s), as in the thesis.
 const BLOOD: f64 = 4.0e-6;
@@ -19,10 +18,7 @@ const RANGE: f64 = 0.1;
 const FRAME: f64 = 1.0 / 60.0;
 const DEPTHS: [f64; 7] = [1.0e-6, 3.0e-6, 1.0e-5, 3.0e-5, 1.0e-4, 3.0e-4, 1.0e-3];
 
-pub fn run(h: &mut Harness) {
-    if !h.wants("shallow.delivery") {
-        return;
-    }
+pub fn measure() -> (f64, String) {
     let ctx = context(0);
     let mut worst = 0.0f64;
     let mut points = Vec::new();
@@ -32,18 +28,12 @@ pub fn run(h: &mut Harness) {
         worst = worst.max((share - 1.0).abs());
         points.push([thick * 1e3, share * 1e6 * G * thick.powi(3) / (3.0 * BLOOD)]);
     }
-    h.gate("shallow.delivery", worst, &format!("{worst:.1e}; blood, 1 um to 1 mm deep"));
-    let curve = (0..=40)
-        .map(|i| 1e-6 * 1e3f64.powf(f64::from(i) / 40.0))
-        .map(|d| [d * 1e3, 1e6 * G * d.powi(3) / (3.0 * BLOOD)]);
-    Plot::new(
-        "Blood that a film delivers",
-        Axis::log("depth (mm)"),
-        Axis::log("ml/s for a metre of width, times (1 + S2)2 / S"),
-    )
-    .line("theory, g H3 / (3 nu)", curve)
-    .points("pipes, over an open border", points)
-    .write("shallow_delivery");
+    let curve = ratios(1e-6, 1e-3, 40).map(|d| [d * 1e3, 1e6 * G * d.powi(3) / (3.0 * BLOOD)]);
+    Plot::log("Blood that a film delivers", "depth (mm)", "ml/s for a metre of width, times (1 + S2)2 / S")
+        .line("theory, g H3 / (3 nu)", curve)
+        .points("pipes, over an open border", points)
+        .write("shallow_delivery");
+    (worst, format!("{worst:.1e}; blood, 1 um to 1 mm deep"))
 }
 
 /// The slope that a film flows on.

@@ -8,9 +8,8 @@ use frazil::Context;
 use frazil::shallow::Shallow;
 
 use crate::common::liquids::context;
-use crate::harness::Harness;
-use crate::plots::chart::{Axis, Plot};
-use crate::shallow::ground::{G, between, dry, ground, pour, viscous};
+use crate::plots::Plot;
+use crate::shallow::ground::{G, between, dry, even, ground, pour, viscous};
 
 /// Cells along an edge of the basin: a wave.
 const CELLS: usize = 128;
@@ -25,24 +24,18 @@ const PERIOD: usize = 256 / SAMPLE;
 /// Water (m2/s).
 const WATER: f64 = 1.0e-6;
 
-pub fn run(h: &mut Harness) {
-    if !h.wants("shallow.energy") {
-        return;
-    }
+pub fn measure() -> [(f64, String); 3] {
     let ctx = context(0);
     let [free, steep] = AMPLITUDES.map(|amplitude| Waves::run(&ctx, 0.0, amplitude));
     let most = |waves: &Waves| waves.energies.iter().fold(0.0f64, |most, energy| most.max(*energy));
     let note = |waves: &Waves| format!("{:.6} at the end", waves.energies[waves.energies.len() - 1]);
-    h.gate("shallow.energy_start", most(&free), &note(&free));
-    h.gate("shallow.energy_high", most(&steep), &note(&steep));
     let slowed = AMPLITUDES.map(|amplitude| Waves::run(&ctx, WATER, amplitude));
     let growth = |waves: &Waves| {
         let pairs = waves.energies.iter().zip(&waves.energies[PERIOD..]);
         pairs.map(|(before, behind)| behind / before - 1.0).fold(f64::MIN, f64::max)
     };
     let growths = slowed.each_ref().map(growth);
-    let note = format!("water, waves of 1 % and 10 % of the depth: {growths:.6?}");
-    h.gate("shallow.energy_viscous", growths[0].max(growths[1]), &note);
+    let of_growth = format!("water, waves of 1 % and 10 % of the depth: {growths:.6?}");
     let [slowed, _] = slowed;
     let shown = |waves: &Waves| -> Vec<[f64; 2]> {
         let energies = waves.energies.iter().enumerate().step_by(24);
@@ -50,16 +43,13 @@ pub fn run(h: &mut Harness) {
     };
     let periods = STEPS as f64 / (PERIOD * SAMPLE) as f64;
     let decay = |t: f64| (-3.0 * WATER / (DEEP * DEEP) * t * slowed.period).exp();
-    Plot::new(
-        "Energy of standing waves",
-        Axis::linear("time (periods)"),
-        Axis::linear("energy over its start"),
-    )
-    .line("theory, nu = 0", [[0.0, 1.0], [periods, 1.0]])
-    .line("theory, water", (0..=50).map(|i| periods * f64::from(i) / 50.0).map(|t| [t, decay(t)]))
-    .points("pipes, nu = 0", shown(&free))
-    .points("pipes, water", shown(&slowed))
-    .write("shallow_energy");
+    Plot::linear("Energy of standing waves", "time (periods)", "energy over its start")
+        .line("theory, nu = 0", [[0.0, 1.0], [periods, 1.0]])
+        .line("theory, water", even(0.0, periods, 50).map(|t| [t, decay(t)]))
+        .points("pipes, nu = 0", shown(&free))
+        .points("pipes, water", shown(&slowed))
+        .write("shallow_energy");
+    [(most(&free), note(&free)), (most(&steep), note(&steep)), (growths[0].max(growths[1]), of_growth)]
 }
 
 /// Waves that have run.

@@ -4,8 +4,8 @@ use frazil::Context;
 
 use crate::common::liquids::context;
 use crate::harness::Harness;
-use crate::plots::chart::{Axis, Plot};
-use crate::shallow::ground::{G, between, depth, dry, ground, pour, run_until, viscous};
+use crate::plots::Plot;
+use crate::shallow::ground::{G, between, depth, dry, ground, pour, ratios, run_until, viscous};
 
 /// Blood (m2/s), as in the thesis.
 const BLOOD: f64 = 4.0e-6;
@@ -17,12 +17,8 @@ const DEPTHS: [f64; 6] = [1.0e-5, 3.0e-5, 1.0e-4, 2.0e-4, 3.0e-4, 4.0e-4];
 
 pub fn run(h: &mut Harness) {
     let ctx = context(0);
-    if ["shallow.film_exact", "shallow.film_short_steps"].iter().any(|name| h.wants(name)) {
-        exact(h, &ctx);
-    }
-    if h.wants("shallow.film_steep") {
-        steep(h, &ctx);
-    }
+    h.measure_all(["shallow.film_exact", "shallow.film_short_steps"], || exact(&ctx));
+    h.measure("shallow.film_steep", || steep(&ctx));
 }
 
 /// The mean velocity of a steady film on ground that falls by `slope` along x and z, over theory, and its component across over theory; so many
@@ -52,7 +48,7 @@ fn film(ctx: &Context, slope: [f64; 2], thick: f64, frames: f64) -> [f64; 2] {
 }
 
 /// A slope of 0.1.
-fn exact(h: &mut Harness, ctx: &Context) {
+fn exact(ctx: &Context) -> [(f64, String); 2] {
     let (mut worst, mut worst_fine) = (0.0f64, 0.0f64);
     let mut points = Vec::new();
     for thick in DEPTHS {
@@ -62,11 +58,10 @@ fn exact(h: &mut Harness, ctx: &Context) {
         worst_fine = worst_fine.max((fine - 1.0).abs());
         points.push([thick * 1e3, along * theory(0.1, thick) * 1e3]);
     }
-    h.gate("shallow.film_exact", worst, &format!("{worst:.1e}; blood, 0.01 to 0.4 mm deep"));
-    // What a flux still grows by is then less than half of its last bit.
-    let note = format!("{worst_fine:.1e}; steps of a hundredth of the time in which a film settles");
-    h.gate("shallow.film_short_steps", worst_fine, &note);
     plot(ctx, points);
+    // What a flux still grows by in short steps is less than half of its last bit.
+    let of_short = format!("{worst_fine:.1e}; steps of a hundredth of the time in which a film settles");
+    [(worst, format!("{worst:.1e}; blood, 0.01 to 0.4 mm deep")), (worst_fine, of_short)]
 }
 
 fn theory(slope: f64, thick: f64) -> f64 {
@@ -74,14 +69,10 @@ fn theory(slope: f64, thick: f64) -> f64 {
 }
 
 fn plot(ctx: &Context, gentle: Vec<[f64; 2]>) {
-    let curve = |slope: f64| {
-        (0..=40)
-            .map(move |i| 1e-5 * 40f64.powf(f64::from(i) / 40.0))
-            .map(move |d| [d * 1e3, theory(slope, d) * 1e3])
-    };
+    let curve = |slope: f64| ratios(1e-5, 4e-4, 40).map(move |d| [d * 1e3, theory(slope, d) * 1e3]);
     let steep =
         DEPTHS.map(|thick| [thick * 1e3, film(ctx, [1.0, 0.0], thick, 1.0)[0] * theory(1.0, thick) * 1e3]);
-    Plot::new("Nusselt film of blood", Axis::log("depth (mm)"), Axis::log("mean velocity (mm/s)"))
+    Plot::log("Nusselt film of blood", "depth (mm)", "mean velocity (mm/s)")
         .line("theory, slope 0.1", curve(0.1))
         .line("theory, slope 1", curve(1.0))
         .points("pipes, slope 0.1", gentle)
@@ -90,7 +81,7 @@ fn plot(ctx: &Context, gentle: Vec<[f64; 2]>) {
 }
 
 /// Slopes to 45 degrees, along x, z and between.
-fn steep(h: &mut Harness, ctx: &Context) {
+fn steep(ctx: &Context) -> (f64, &'static str) {
     let mut worst = 0.0f64;
     for slope in [0.25, 0.5, 0.75, 1.0] {
         let diagonal = slope * std::f64::consts::FRAC_1_SQRT_2;
@@ -99,9 +90,5 @@ fn steep(h: &mut Harness, ctx: &Context) {
             worst = worst.max(100.0 * (along - 1.0).abs()).max(100.0 * across.abs());
         }
     }
-    h.gate(
-        "shallow.film_steep",
-        worst,
-        "blood, 0.1 mm deep; slopes 0.25 to 1, along x, z, and at 45 and 37 degrees to x",
-    );
+    (worst, "blood, 0.1 mm deep; slopes 0.25 to 1, along x, z, and at 45 and 37 degrees to x")
 }

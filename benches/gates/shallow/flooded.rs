@@ -4,15 +4,14 @@
 use std::f64::consts::TAU;
 
 use frazil::Context;
-use frazil::shallow::columns::grid::{BOTTOMLESS, Grid};
+use frazil::shallow::columns::grid::BOTTOMLESS;
 use frazil::shallow::material::Liquid;
-use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
 
 use crate::common::shallow::context;
 use crate::harness::Harness;
-use crate::plots::chart::{Axis, Plot};
-use crate::shallow::ground::{G, between, depth, viscous};
+use crate::plots::Plot;
+use crate::shallow::ground::{G, between, depth, even, swing, terrain, viscous};
 
 /// Edge of a cell, height of the passage, and how high the legs stand (m).
 const CELL: f64 = 0.005;
@@ -36,12 +35,8 @@ const TUBES: [(&str, Tube); 3] = [
 
 /// Both gates.
 pub fn run(h: &mut Harness) {
-    if h.wants("shallow.flooded_period") {
-        period(h);
-    }
-    if h.wants("shallow.flooded_levels") {
-        levels(h);
-    }
+    h.measure("shallow.flooded_period", period);
+    h.measure("shallow.flooded_levels", levels);
 }
 
 impl Tube {
@@ -64,20 +59,18 @@ impl Tube {
     fn filled(self, ctx: &Context, apart: f64, params: Params) -> Shallow {
         let legs = self.legs();
         let heights = between(-0.01, 0.3);
-        let grid = Grid { cell: CELL, origin: [0.0; 2], size: self.along.map(|count| count + 1) };
+        let size = self.along.map(|count| count + 1);
         let is_passage = |[x, z]: [usize; 2]| z == 0 || x == self.along[0];
-        let solids = |index: usize| {
-            let cell = [index % grid.size[0], index / grid.size[0]];
+        let solids = terrain(size, CELL, heights, |cell| {
             let floor = [BOTTOMLESS, heights.round(0.0)];
             match (legs.contains(&cell), is_passage(cell)) {
                 (true, _) => vec![floor],
                 (_, true) => vec![floor, [heights.round(HIGH), heights.round(0.25)]],
                 _ => vec![[BOTTOMLESS, heights.round(0.25)]],
             }
-        };
-        let solids = Solids::new(grid, heights, (0..grid.cells()).map(solids));
+        });
         let mut tube = Shallow::new(ctx, &solids, params).expect("a tube");
-        for cell in (0..grid.cells()).map(|index| [index % grid.size[0], index / grid.size[0]]) {
+        for cell in (0..size[0] * size[1]).map(|index| [index % size[0], index / size[0]]) {
             let depth = match legs.iter().position(|leg| *leg == cell) {
                 Some(0) => LEVEL + 0.5 * apart,
                 Some(_) => LEVEL - 0.5 * apart,
@@ -98,30 +91,22 @@ impl Tube {
 }
 
 /// A swing without friction.
-fn period(h: &mut Harness) {
+fn period() -> (f64, String) {
     let ctx = context();
     let apart = 0.001;
     let (mut worst, mut notes): (f64, Vec<String>) = (0.0, Vec::new());
-    let theory = (0..=600).map(|i| f64::from(i) / 100.0).map(|t| [t, 1e3 * apart * libm::cos(TAU * t)]);
-    let mut plot = Plot::new(
+    let theory = even(0.0, 6.0, 600).map(|t| [t, 1e3 * apart * libm::cos(TAU * t)]);
+    let mut plot = Plot::linear(
         "Swing of two legs through a flooded passage",
-        Axis::linear("time (periods of theory)"),
-        Axis::linear("difference of levels (mm)"),
+        "time (periods of theory)",
+        "difference of levels (mm)",
     )
     .line("theory", theory);
     for (which, (name, tube)) in TUBES.into_iter().enumerate() {
         let mut liquid = tube.filled(&ctx, apart, viscous(0.0));
         let period = tube.period();
         let dt = period / FRAMES as f64;
-        let mut swing = vec![[0.0, tube.apart(&liquid)]];
-        for frame in 1..=PERIODS * FRAMES {
-            liquid.step(&ctx, dt).expect("a frame");
-            swing.push([frame as f64 * dt, tube.apart(&liquid)]);
-        }
-        let falls = swing.windows(2).filter(|ends| ends[0][1] > 0.0 && ends[1][1] <= 0.0);
-        let zeros: Vec<f64> =
-            falls.map(|ends| ends[0][0] + dt * ends[0][1] / (ends[0][1] - ends[1][1])).collect();
-        let own = (zeros[zeros.len() - 1] - zeros[0]) / (zeros.len() - 1) as f64;
+        let (swing, own) = swing(&mut liquid, &ctx, dt, PERIODS * FRAMES, |liquid| tube.apart(liquid));
         let off = 100.0 * (own / period - 1.0);
         let last = swing[(PERIODS - 1) * FRAMES..].iter().map(|position| position[1]).fold(0.0, f64::max);
         worst = worst.max(off.abs());
@@ -130,12 +115,12 @@ fn period(h: &mut Harness) {
         let shown = swing.iter().skip(which * FRAMES / 30).step_by(FRAMES / 10);
         plot = plot.points(name, shown.map(|[time, y]| [time / period, 1e3 * y]));
     }
-    h.gate("shallow.flooded_period", worst, &notes.join("; "));
     plot.write("shallow_flooded");
+    (worst, notes.join("; "))
 }
 
 /// Where legs come to rest, against the level at which all liquid is there and the passage is full; over how far they were apart.
-fn levels(h: &mut Harness) {
+fn levels() -> (f64, String) {
     let ctx = context();
     let apart = 0.02;
     let (mut worst, mut notes): (f64, Vec<String>) = (0.0, Vec::new());
@@ -150,5 +135,5 @@ fn levels(h: &mut Harness) {
         notes.push(format!("{name}: {:+.1e}, {:+.1e}", off[0], off[1]));
     }
     let unit = between(-0.01, 0.3).unit / apart;
-    h.gate("shallow.flooded_levels", worst, &format!("{}; a unit is {unit:.1e}", notes.join("; ")));
+    (worst, format!("{}; a unit is {unit:.1e}", notes.join("; ")))
 }

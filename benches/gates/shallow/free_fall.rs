@@ -11,7 +11,7 @@ use frazil::shallow::{Params, Shallow};
 use crate::common::bodies::Dice;
 use crate::common::shallow::{Turn, busy, context, ground, source};
 use crate::harness::Harness;
-use crate::shallow::ground::G;
+use crate::shallow::ground::{G, change};
 
 /// Edge of a cell (m).
 const CELL: f64 = 0.002;
@@ -22,16 +22,12 @@ const EVERY: u32 = 25;
 
 /// Both gates.
 pub fn run(h: &mut Harness) {
-    if h.wants("shallow.fall_path") {
-        path(h);
-    }
-    if h.wants("shallow.fall_volume") {
-        volume(h);
-    }
+    h.measure("shallow.fall_path", path);
+    h.measure("shallow.fall_volume", volume);
 }
 
 /// The furthest that a packet, or the middle of the first liquid that has landed, is from where ballistics has it (% of the height).
-fn path(h: &mut Harness) {
+fn path() -> (f64, String) {
     let ctx = context();
     let (mut worst, mut note): (f64, String) = (0.0, String::new());
     for (height, name, viscosity, rate) in [
@@ -54,7 +50,7 @@ fn path(h: &mut Harness) {
                 &format!("{name} {height} m {pace:?}: {count} places {flight:.1e}, landing {landing:.3}; ");
         }
     }
-    h.gate("shallow.fall_path", worst, &note);
+    (worst, note)
 }
 
 /// How far packets over a fall of a height (m), and the first liquid on the ground below, are off (% of it), and the count of positions that were compared.
@@ -113,7 +109,7 @@ fn middle_below(liquid: &Shallow, edge: f64) -> Option<f64> {
 }
 
 /// Units that are missing, or too many, in any frame of a busy scene with falls, in which a ball moves about.
-fn volume(h: &mut Harness) {
+fn volume() -> (f64, String) {
     let ctx = context();
     let mut plan = busy([93, 61]);
     let falls = Falls { height: 0.002, drop: 0.0, most: 500, ..Falls::default() };
@@ -124,15 +120,7 @@ fn volume(h: &mut Harness) {
     let (mut most, mut flown, mut full) = (0, 0, 0);
     while steps < STEPS {
         if frame % EVERY == 0 {
-            for _ in 0..200 {
-                let column = dice.below(liquid.columns().len());
-                if liquid.columns().is_column(column) {
-                    liquid.pour(column, dice.between(-2e-3, 1e-3));
-                }
-            }
-            let mut params = liquid.params().clone();
-            params.gravity = [dice.between(-3.0, 3.0), -9.81, dice.between(-3.0, 3.0)];
-            liquid.set_params(params).expect("parameters");
+            change(&mut liquid, &mut dice);
         }
         if frame % 3 == 0 {
             let centre =
@@ -157,5 +145,5 @@ fn volume(h: &mut Harness) {
         1e6 * all.lost,
         1e6 * all.held,
     );
-    h.gate("shallow.fall_volume", wrong as f64, &note);
+    (wrong as f64, note)
 }

@@ -4,9 +4,10 @@
 use frazil::Context;
 
 use crate::common::liquids::context;
-use crate::harness::Harness;
-use crate::plots::chart::{Axis, Plot};
-use crate::shallow::ground::{G, between, depth, dry, ground, power, run_until, viscous};
+use crate::plots::Plot;
+use crate::shallow::ground::{
+    G, between, depth, dry, even, front, ground, power, ratios, run_until, viscous,
+};
 
 /// Slope, and kinematic viscosity (m2/s).
 const SLOPE: f64 = 0.5;
@@ -15,13 +16,10 @@ const VISCOSITY: f64 = 1.0e-3;
 const AREA: f64 = 1.0e-4;
 const FIRST: f64 = 0.2;
 const LAST: f64 = 0.4;
-/// Positions of the front that are measured.
-const COUNT: usize = 13;
+/// From one position of the front that is measured to the last.
+const STEPS: u32 = 12;
 
-pub fn run(h: &mut Harness) {
-    if !h.wants("shallow.huppert") {
-        return;
-    }
+pub fn measure() -> [(f64, &'static str); 4] {
     let ctx = context(0);
     let [fine, coarse] = [0.25, 4.0].map(|edge| Current::run(&ctx, edge));
     let exponent = |current: &Current| (power(&current.fronts) - 1.0 / 3.0).abs();
@@ -29,26 +27,24 @@ pub fn run(h: &mut Harness) {
         let off = |[time, front]: &[f64; 2]| 100.0 * (front / front_at(*time) - 1.0).abs();
         current.fronts.iter().map(off).fold(0.0, f64::max)
     };
-    h.gate("shallow.huppert_exponent", exponent(&fine), "off 1/3, cells of a quarter of the depth");
-    h.gate("shallow.huppert_exponent_coarse", exponent(&coarse), "off 1/3, cells of four times the depth");
-    h.gate("shallow.huppert_front", off(&fine), "cells of a quarter of the depth");
-    h.gate("shallow.huppert_front_coarse", off(&coarse), "cells of four times the depth");
-    let theory = (0..=40).map(|i| time_at(FIRST * 2f64.powf(f64::from(i) / 40.0)));
-    Plot::new("Viscous current down a slope (Huppert 1982)", Axis::log("time (s)"), Axis::log("front (m)"))
+    let theory = ratios(FIRST, LAST, 40).map(time_at);
+    Plot::log("Viscous current down a slope (Huppert 1982)", "time (s)", "front (m)")
         .line("theory, power 1/3", theory.map(|time| [time, front_at(time)]))
         .points("pipes, cells of a quarter of the depth", fine.fronts.iter().copied())
         .points("pipes, cells of 4 depths", coarse.fronts.iter().copied())
         .write("shallow_huppert");
     let end = time_at(LAST);
-    let shape = (0..=80).map(|i| LAST * f64::from(i) / 80.0).map(|x| [x, 1e3 * depth_at(x, end)]);
-    Plot::new(
-        "Viscous current down a slope: its depth",
-        Axis::linear("along the slope (m)"),
-        Axis::linear("depth (mm)"),
-    )
-    .line("theory", shape.chain([[LAST, 0.0]]))
-    .points("pipes, cells of 4 depths", coarse.shape)
-    .write("shallow_huppert_shape");
+    let shape = even(0.0, LAST, 80).map(|x| [x, 1e3 * depth_at(x, end)]);
+    Plot::linear("Viscous current down a slope: its depth", "along the slope (m)", "depth (mm)")
+        .line("theory", shape.chain([[LAST, 0.0]]))
+        .points("pipes, cells of 4 depths", coarse.shape.iter().copied())
+        .write("shallow_huppert_shape");
+    [
+        (exponent(&fine), "off 1/3, cells of a quarter of the depth"),
+        (exponent(&coarse), "off 1/3, cells of four times the depth"),
+        (off(&fine), "cells of a quarter of the depth"),
+        (off(&coarse), "cells of four times the depth"),
+    ]
 }
 
 /// Theory: the front at a time (s).
@@ -93,21 +89,12 @@ impl Current {
             shallow.pour(column, AREA / (wide * cell));
         }
         let mut fronts = Vec::new();
-        for i in 0..COUNT {
-            let time = time_at(FIRST * (LAST / FIRST).powf(i as f64 / (COUNT - 1) as f64));
+        for time in ratios(FIRST, LAST, STEPS).map(time_at) {
             run_until(&mut shallow, ctx, time, (time_at(LAST) - time_at(FIRST)) / 20.0);
-            fronts.push([time, front(&shallow, front_at(time))]);
+            // Half of the depth of theory behind the front.
+            fronts.push([time, front(&shallow, 0, 0.75 * AREA / front_at(time))]);
         }
         let shape = (0..count).map(|x| [(x as f64 + 0.5) * cell, 1e3 * depth(&shallow, [x, 0])]).collect();
         Self { fronts, shape }
     }
-}
-
-/// Where the depth falls through half of that of theory behind a front (m).
-fn front(shallow: &frazil::shallow::Shallow, theory: f64) -> f64 {
-    let (half, cell) = (0.75 * AREA / theory, shallow.columns().grid.cell);
-    let last = (0..shallow.columns().grid.size[0]).rev().find(|&x| depth(shallow, [x, 0]) > half);
-    let last = last.expect("a current");
-    let [before, behind] = [last, last + 1].map(|x| depth(shallow, [x, 0]));
-    (last as f64 + 0.5 + (before - half) / (before - behind)) * cell
 }

@@ -2,12 +2,12 @@
 //! (1982); and what other models of friction do to a film: Mould and Yang's drag (1997), which knows no depth, and explicit viscosity.
 
 use frazil::Context;
+use frazil::shallow::Params;
 use frazil::shallow::params::Friction;
-use frazil::shallow::{Params, Shallow};
 
 use crate::common::shallow::context;
 use crate::harness::Harness;
-use crate::shallow::ground::{G, between, depth, dry, ground, run_until, viscous};
+use crate::shallow::ground::{G, between, dry, front, ground, ratios, run_until, viscous};
 
 /// The incline's slope, and viscosities (m2/s).
 const SLOPE: f64 = 0.35;
@@ -18,20 +18,14 @@ const FIRST: f64 = 0.1;
 const LAST: f64 = 0.2;
 /// Rows of cells: walls do not reach the middle.
 const WIDE: usize = 81;
-/// Positions of the front that are measured.
-const COUNT: usize = 7;
+/// From one position of the front that is measured to the last.
+const STEPS: u32 = 6;
 
 /// All gates.
 pub fn run(h: &mut Harness) {
-    if h.wants("shallow.incline_front") {
-        fronts(h);
-    }
-    if h.wants("shallow.mould_yang") {
-        mould_yang(h);
-    }
-    if h.wants("shallow.explicit_step") {
-        explicit(h);
-    }
+    h.measure("shallow.incline_front", fronts);
+    h.measure("shallow.mould_yang", mould_yang);
+    h.measure("shallow.explicit_step", explicit);
 }
 
 fn slowed(viscosity: f64) -> f64 {
@@ -44,7 +38,7 @@ fn time_at(front: f64, viscosity: f64) -> f64 {
 }
 
 /// Fronts in the middle of the incline, with each viscosity and friction.
-fn fronts(h: &mut Harness) {
+fn fronts() -> (f64, String) {
     let ctx = context();
     let (mut worst, mut notes) = (0.0f64, Vec::new());
     for viscosity in VISCOSITIES {
@@ -53,11 +47,7 @@ fn fronts(h: &mut Harness) {
         worst = worst.max(own);
         notes.push(format!("{viscosity} m2/s: {own:.2} %, with friction at the ground only {thesis:.2} %"));
     }
-    h.gate(
-        "shallow.incline_front",
-        worst,
-        &format!("cells as large as the front is deep; {}", notes.join("; ")),
-    );
+    (worst, format!("cells as large as the front is deep; {}", notes.join("; ")))
 }
 
 /// How far the front is off theory at most (%).
@@ -72,21 +62,13 @@ fn front_off(ctx: &Context, viscosity: f64, friction: Friction) -> f64 {
         let column = liquid.columns().column(cell_at, 0).expect("ground everywhere");
         liquid.pour(column, AREA / (first * cell));
     }
-    let off = |i: usize| {
-        let position = FIRST * (LAST / FIRST).powf(i as f64 / (COUNT - 1) as f64);
+    let off = |position: f64| {
         let time = time_at(position, viscosity);
         run_until(&mut liquid, ctx, time, time_at(LAST, viscosity) / 200.0);
-        100.0 * (front(&liquid, position) / position - 1.0).abs()
+        // Half of the depth of theory behind the front.
+        100.0 * (front(&liquid, WIDE / 2, 0.75 * AREA / position) / position - 1.0).abs()
     };
-    (0..COUNT).map(off).fold(0.0, f64::max)
-}
-
-/// Where the depth in the middle falls through half of that of theory behind a front (m).
-fn front(liquid: &Shallow, theory: f64) -> f64 {
-    let (half, cell) = (0.75 * AREA / theory, liquid.columns().grid.cell);
-    let at = |x: usize| depth(liquid, [x, WIDE / 2]);
-    let last = (0..liquid.columns().grid.size[0]).rev().find(|&x| at(x) > half).expect("a current");
-    (last as f64 + 0.5 + (at(last) - half) / (at(last) - at(last + 1))) * cell
+    ratios(FIRST, LAST, STEPS).map(off).fold(0.0, f64::max)
 }
 
 /// Nusselt's film on the incline (m/s).
@@ -95,18 +77,18 @@ fn film(thick: f64, viscosity: f64) -> f64 {
 }
 
 /// A drag that keeps the same part of a flux each second, whatever its depth: right for blood of 0.2 mm, it is tried on films of half and twice the depth.
-fn mould_yang(h: &mut Harness) {
+fn mould_yang() -> (f64, String) {
     let (viscosity, dt) = (4.0e-6, 1.0e-4);
     let kept = 1.0 - G * SLOPE * dt / film(2e-4, viscosity);
     let steady = |_thick: f64| (0..20_000).fold(0.0, |u, _| kept * u + dt * G * SLOPE);
     let off = [1e-4, 2e-4, 4e-4].map(|thick| 100.0 * (steady(thick) / film(thick, viscosity) - 1.0));
     let note =
         format!("films of blood of 0.1, 0.2 and 0.4 mm: {:+.0}, {:+.0} and {:+.0} %", off[0], off[1], off[2]);
-    h.gate("shallow.mould_yang", off.into_iter().map(f64::abs).fold(0.0, f64::max), &note);
+    (off.into_iter().map(f64::abs).fold(0.0, f64::max), note)
 }
 
 /// The longest stable step of explicit viscosity, by trial: du/dt = g S - 3 nu u / H^2 + nu d2u/dy2 in a channel of 8 cells of 0.5 mm, 1 mm deep.
-fn explicit(h: &mut Harness) {
+fn explicit() -> (f64, String) {
     let (cell, thick) = (5e-4, 1e-3);
     let is_stable = |dt: f64, viscosity: f64| {
         let mut u = [0.0f64; 8];
@@ -135,5 +117,5 @@ fn explicit(h: &mut Harness) {
     let note = format!(
         "syrup of 0.4 m2/s; {drop:.3} ms with 1e-3 m2/s, {blood:.2} ms with 4e-6; ours: 3 ms and as long as one likes"
     );
-    h.gate("shallow.explicit_step", syrup, &note);
+    (syrup, note)
 }

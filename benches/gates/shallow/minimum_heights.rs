@@ -22,15 +22,9 @@ const FADE: f64 = 0.02;
 
 /// All of them.
 pub fn run(h: &mut Harness) {
-    if h.wants("shallow.lift_uncovered") || h.wants("shallow.lift_discarded") {
-        covered(h);
-    }
-    if h.wants("shallow.surface_rim") {
-        rim(h);
-    }
-    if h.wants("shallow.surface_jump") {
-        jump(h);
-    }
+    h.measure_all(["shallow.lift_uncovered", "shallow.lift_discarded"], covered);
+    h.measure("shallow.surface_rim", rim);
+    h.measure("shallow.surface_jump", jump);
 }
 
 /// A surface: heights and columns of its vertices, positions in cells from the centre of cell (0, 0), and triangles.
@@ -233,7 +227,7 @@ impl Above {
 }
 
 /// Films of many depths on many grounds.
-fn covered(h: &mut Harness) {
+fn covered() -> [(f64, String); 2] {
     let (mut lifted, mut plain) = (Above::default(), Above::default());
     let mut sum = Fitted::default();
     let mut most = 0.0f64;
@@ -257,17 +251,12 @@ fn covered(h: &mut Harness) {
          least depth of 0.05 cells only {}, by {:.3} cells",
         lifted.looked, lifted.deep, lifted.highest, plain.film, plain.highest
     );
-    if h.wants("shallow.lift_uncovered") {
-        h.gate("shallow.lift_uncovered", lifted.film as f64, &note);
-    }
-    if h.wants("shallow.lift_discarded") {
-        let Fitted { upward, discarded, capped } = sum;
-        let share = 100.0 * (discarded + capped) as f64 / upward as f64;
-        let note = format!(
-            "{discarded} of {upward} that face up, and {capped} under low ceilings; the greatest lift is {most:.2} cells"
-        );
-        h.gate("shallow.lift_discarded", share, &note);
-    }
+    let Fitted { upward, discarded, capped } = sum;
+    let share = 100.0 * (discarded + capped) as f64 / upward as f64;
+    let of_lifts = format!(
+        "{discarded} of {upward} that face up, and {capped} under low ceilings; the greatest lift is {most:.2} cells"
+    );
+    [(lifted.film as f64, note), (share, of_lifts)]
 }
 
 /// How far rims are over the ground.
@@ -317,7 +306,7 @@ impl Rims {
 }
 
 /// Edges of patches of liquid on open ground; under slabs and at cliffs of two cells and more, where they hang over, they are counted.
-fn rim(h: &mut Harness) {
+fn rim() -> (f64, String) {
     let mut lifted: [Rims; 3] = Default::default();
     let mut plain = Rims::default();
     for seed in 0..SEEDS {
@@ -346,11 +335,11 @@ fn rim(h: &mut Harness) {
         cliff.samples,
         cliff.worst
     );
-    h.gate("shallow.surface_rim", open.worst, &note);
+    (open.worst, note)
 }
 
 /// Blood that runs over rough ground, and dries there.
-fn jump(h: &mut Harness) {
+fn jump() -> (f64, String) {
     let ctx = context();
     let (mut worst, mut flips) = ([0.0f64; 2], 0);
     let mut frames = Vec::new();
@@ -400,7 +389,7 @@ fn jump(h: &mut Harness) {
         at(0.99),
         at(1.0)
     );
-    h.gate("shallow.surface_jump", worst[0], &note);
+    (worst[0], note)
 }
 
 /// The solids of columns.

@@ -1,6 +1,7 @@
 //! Shallow liquids.
 
 pub mod bowl;
+pub mod buffers;
 pub mod core;
 pub mod dam;
 pub mod delivery;

@@ -3,9 +3,8 @@
 use frazil::shallow::sources::{FlowPoint, Kind};
 
 use crate::common::liquids::context;
-use crate::harness::Harness;
-use crate::plots::chart::{Axis, Plot};
-use crate::shallow::ground::{G, between, dry, ground, pour, viscous};
+use crate::plots::Plot;
+use crate::shallow::ground::{G, between, dry, even, ground, pour, viscous};
 
 /// Edge of the basin (cells), and of a cell (m).
 const EDGE: usize = 50;
@@ -18,10 +17,7 @@ const LEVELS: [f64; 2] = [0.04, 0.005];
 const FRAME: f64 = 1.0 / 60.0;
 
 /// The rate of a basin of water that runs empty, against Cd a (2 g H)^(1/2) of the mean depth.
-pub fn run(h: &mut Harness) {
-    if !h.wants("shallow.orifice") {
-        return;
-    }
+pub fn measure() -> (f64, String) {
     let ctx = context(0);
     let solids = ground([EDGE; 2], CELL, between(-0.01, 0.1), |_| 0.0);
     let mut basin = dry(&ctx, &solids, viscous(1.0e-6));
@@ -54,11 +50,11 @@ pub fn run(h: &mut Harness) {
         }
         before = after;
     }
-    let time = basin.time();
-    h.gate("shallow.orifice", worst, &format!("40 to 5 mm of water in {time:.1} s; {} rates", points.len()));
-    let curve = (0..=40).map(|i| LEVELS[1] + (LEVELS[0] - LEVELS[1]) * f64::from(i) / 40.0);
-    Plot::new("A basin runs empty through a hole", Axis::linear("depth (mm)"), Axis::linear("ml/s"))
+    let note = format!("40 to 5 mm of water in {:.1} s; {} rates", basin.time(), points.len());
+    let curve = even(LEVELS[1], LEVELS[0], 40);
+    Plot::linear("A basin runs empty through a hole", "depth (mm)", "ml/s")
         .line("theory, Cd a (2 g H)^1/2", curve.map(|depth| [1e3 * depth, 1e6 * law(depth)]))
         .points("an orifice", points)
         .write("shallow_orifice");
+    (worst, note)
 }

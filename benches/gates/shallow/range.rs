@@ -1,7 +1,6 @@
 //! Gate of shallow's range of depths: whatever is asked for, liquid stays between the ground and what is above it.
 
 use crate::common::shallow::{Turn, context, extreme, extreme_frame, violations};
-use crate::harness::Harness;
 
 /// Scenes.
 const SCENES: u64 = 10_000;
@@ -9,10 +8,7 @@ const SCENES: u64 = 10_000;
 const FRAMES: usize = 12;
 
 /// Depths out of range, and fluxes that are not finite, over random scenes.
-pub fn run(h: &mut Harness) {
-    if !h.wants("shallow.depth_range") {
-        return;
-    }
+pub fn measure() -> (f64, String) {
     let mut sums = Sums::default();
     (0..SCENES).for_each(|seed| sums.add(&flow(seed)));
     let Sums { violations, missing, columns, emptied, filled } = sums;
@@ -21,7 +17,7 @@ pub fn run(h: &mut Harness) {
          {filled}",
         columns / SCENES
     );
-    h.gate("shallow.depth_range", (violations + missing) as f64, &note);
+    ((violations + missing) as f64, note)
 }
 
 /// What a scene did, and all of them.

@@ -4,14 +4,17 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::Shallow;
-use frazil::shallow::free_fall::mesh::{Balls, Target as DropTarget, bound as drops_bound};
+use frazil::shallow::free_fall::mesh::Balls;
 use frazil::shallow::free_fall::{Droplet, Falls};
-use frazil::shallow::surface::{Depths, Indices, Layout, Surface, Target, bound};
+use frazil::shallow::surface::rim::ledges::Ledges;
+use frazil::shallow::surface::{Depths, Layout, Surface};
 use frazil::{Context, Pool};
 
 use crate::common::bodies::Dice;
 use crate::common::shallow::{Plan, Turn, busy, context, hash, turnable};
 use crate::harness::Harness;
+use crate::process::is_same_at_levels;
+use crate::shallow::buffers::Buffers;
 
 /// Random scenes that are turned.
 const SCENES: u64 = 60;
@@ -20,37 +23,33 @@ const FRAMES: u64 = 30;
 
 /// All of them.
 pub fn run(h: &mut Harness) {
-    if h.wants("shallow.same_rotated") {
+    h.measure("shallow.same_rotated", || {
         let (is_same, note) = turned(&Turn::TURNS);
-        h.holds("shallow.same_rotated", is_same, &format!("by 90, 180 and 270 degrees; {note}"));
-    }
-    if h.wants("shallow.same_mirrored") {
+        (is_same, format!("by 90, 180 and 270 degrees; {note}"))
+    });
+    h.measure("shallow.same_mirrored", || {
         let (is_same, note) = turned(&Turn::MIRRORS);
-        h.holds("shallow.same_mirrored", is_same, &format!("along x, along z, over both diagonals; {note}"));
-    }
-    if h.wants("shallow.same_replay") {
+        (is_same, format!("along x, along z, over both diagonals; {note}"))
+    });
+    h.measure("shallow.same_replay", || {
         let differ = (0..SCENES).filter(|&seed| !replays(seed)).count();
-        h.holds("shallow.same_replay", differ == 0, &format!("{SCENES} scenes, {differ} differ"));
-    }
-    if h.wants("shallow.same_threads") {
-        let hashes = [0, 1, 2].map(|threads| all(&Context::new(Pool::new(threads).expect("threads"))));
-        h.holds("shallow.same_threads", hashes.iter().all(|hash| *hash == hashes[0]), "0, 1 and 2 threads");
-    }
-    if h.wants("shallow.same_cpu") {
+        (differ == 0, format!("{SCENES} scenes, {differ} differ"))
+    });
+    h.measure("shallow.same_threads", || (is_same_on_threads(all), "0, 1 and 2 threads"));
+    h.measure("shallow.same_cpu", || {
         let note = format!("FRAZIL_CPU baseline, avx2, avx512; this one has {:?}", cpu_level());
-        h.holds("shallow.same_cpu", is_same_at_levels(HASH), &note);
-    }
-    if h.wants("shallow.surface_same") {
-        let hashes = [0, 1, 2].map(|threads| surfaces(&Context::new(Pool::new(threads).expect("threads"))));
-        let is_same = hashes.iter().all(|hash| *hash == hashes[0]) && is_same_at_levels(SURFACES);
-        h.holds("shallow.surface_same", is_same, "0, 1 and 2 threads; FRAZIL_CPU baseline, avx2, avx512");
-    }
+        (is_same_at_levels("hash-of-shallow"), note)
+    });
+    h.measure("shallow.surface_same", || {
+        let is_same = is_same_on_threads(surfaces) && is_same_at_levels("hash-of-surfaces");
+        (is_same, "0, 1 and 2 threads; FRAZIL_CPU baseline, avx2, avx512")
+    });
 }
 
-/// Whether processes with all sets of instructions print the same.
-fn is_same_at_levels(argument: &str) -> bool {
-    let hashes = ["baseline", "avx2", "avx512"].map(|level| hash_at(argument, level));
-    hashes.iter().all(|hash| hash.len() == 17 && *hash == hashes[0])
+/// Whether a hash is the same on 0, 1 and 2 threads.
+fn is_same_on_threads(hash: fn(&Context) -> u64) -> bool {
+    let hashes = [0, 1, 2].map(|threads| hash(&Context::new(Pool::new(threads).expect("threads"))));
+    hashes.iter().all(|hash| *hash == hashes[0])
 }
 
 /// Whether scenes that are turned do the same, cell by cell, layer by layer, in each frame.
@@ -113,7 +112,7 @@ fn all(ctx: &Context) -> u64 {
 
 /// A hash of the surfaces of scenes, with all that vertices may have, and of their drops.
 fn surfaces(ctx: &Context) -> u64 {
-    let mut one = Drawn::default();
+    let (mut surface, mut balls) = (Surface::default(), Balls::default());
     let mut all = 0_u64;
     let mut draw = |plan: &Plan, frames: u64| {
         let mut plan = plan.clone();
@@ -122,7 +121,7 @@ fn surfaces(ctx: &Context) -> u64 {
         for frame in 0..frames {
             liquid.step(ctx, 1.0 / 60.0).expect("a frame");
             if frame % 5 == 4 {
-                all = all.rotate_left(1) ^ one.hash(&liquid);
+                all = all.rotate_left(1) ^ hash_drawn(&mut surface, &mut balls, &liquid);
             }
         }
     };
@@ -131,91 +130,45 @@ fn surfaces(ctx: &Context) -> u64 {
     all
 }
 
-/// Buffers of a surface and of drops.
-#[derive(Default)]
-struct Drawn {
-    surface: Surface,
-    balls: Balls,
-    /// Positions, normals, velocities; depths and opacities.
-    vectors: [Vec<f32>; 3],
-    numbers: [Vec<f32>; 2],
-    layers: Vec<u32>,
-    indices: Vec<u32>,
-}
-
-impl Drawn {
-    fn hash(&mut self, liquid: &Shallow) -> u64 {
-        let columns = liquid.columns();
-        let mut velocity = vec![[0.0; 2]; columns.len()];
-        liquid.velocities(&mut velocity).expect("as many places");
-        let depths = Depths {
-            depth: liquid.depths(),
-            velocity: &velocity,
-            active: Some(liquid.active()),
-            ..Depths::default()
-        };
-        let cell = columns.grid.cell;
-        let layout = Layout { least_depth: 0.05 * cell, fade_depth: 0.02 * cell, ..Layout::default() };
-        let drops: Vec<Droplet> = liquid.drops().collect();
-        let (flat, round) = (bound(columns), drops_bound(drops.len()));
-        let count = flat.vertices.max(round.vertices);
-        self.vectors.iter_mut().for_each(|numbers| numbers.resize(3 * count, 0.0));
-        self.numbers.iter_mut().for_each(|numbers| numbers.resize(count, 0.0));
-        self.layers.resize(count, 0);
-        self.indices.resize(flat.indices.max(round.indices), 0);
-        self.surface.reserve(columns);
-        let [positions, normals, velocities] = &mut self.vectors;
-        let [thick, opaque] = &mut self.numbers;
-        let mut target = Target {
-            positions: Some(positions),
-            normals: Some(normals),
-            velocities: Some(velocities),
-            depths: Some(thick),
-            opacities: Some(opaque),
-            layers: Some(&mut self.layers),
-            indices: Indices::U32(&mut self.indices),
-            ..Target::default()
-        };
-        let counts = self.surface.build(columns, &depths, &layout, &mut target).expect("a surface");
-        let mut hasher = DefaultHasher::new();
-        let bits = |hasher: &mut DefaultHasher, numbers: &[f32]| {
-            numbers.iter().for_each(|number| number.to_bits().hash(hasher));
-        };
-        self.vectors.iter().for_each(|numbers| bits(&mut hasher, &numbers[..3 * counts.vertices]));
-        self.numbers.iter().for_each(|numbers| bits(&mut hasher, &numbers[..counts.vertices]));
-        self.layers[..counts.vertices].hash(&mut hasher);
-        self.indices[..counts.indices].hash(&mut hasher);
-        let [positions, normals, _] = &mut self.vectors;
-        let mut target = DropTarget {
-            positions: Some(positions),
-            normals: Some(normals),
-            indices: Indices::U32(&mut self.indices),
-            ..DropTarget::default()
-        };
-        let counts = self.balls.build(&drops, &layout, &mut target).expect("drops");
-        self.vectors[..2].iter().for_each(|numbers| bits(&mut hasher, &numbers[..3 * counts.vertices]));
-        self.indices[..counts.indices].hash(&mut hasher);
-        hasher.finish()
+/// A hash of a surface, with all that vertices may have, and of drops.
+fn hash_drawn(surface: &mut Surface, balls: &mut Balls, liquid: &Shallow) -> u64 {
+    let columns = liquid.columns();
+    let mut velocity = vec![[0.0; 2]; columns.len()];
+    liquid.velocities(&mut velocity).expect("as many places");
+    let depths = Depths {
+        depth: liquid.depths(),
+        velocity: &velocity,
+        active: Some(liquid.active()),
+        ..Depths::default()
+    };
+    let cell = columns.grid.cell;
+    let layout = Layout { least_depth: 0.05 * cell, fade_depth: 0.02 * cell, ..Layout::default() };
+    let drops: Vec<Droplet> = liquid.drops().collect();
+    let mut buffers = Buffers::new(columns, &Ledges::default(), drops.len());
+    surface.reserve(columns);
+    let mut hasher = DefaultHasher::new();
+    let mut bits = |numbers: &[f32]| numbers.iter().for_each(|number| number.to_bits().hash(&mut hasher));
+    let flat = surface.build(columns, &depths, &layout, &mut buffers.all()).expect("a surface");
+    for numbers in [&buffers.positions, &buffers.normals, &buffers.velocities] {
+        bits(&numbers[..3 * flat.vertices]);
     }
+    bits(&buffers.depths[..flat.vertices]);
+    bits(&buffers.opacities[..flat.vertices]);
+    let (layers, triangles) =
+        (buffers.layers[..flat.vertices].to_vec(), buffers.indices[..flat.indices].to_vec());
+    let round = balls.build(&drops, &layout, &mut buffers.drops()).expect("drops");
+    bits(&buffers.positions[..3 * round.vertices]);
+    bits(&buffers.normals[..3 * round.vertices]);
+    [&layers[..], &triangles, &buffers.indices[..round.indices]].map(|numbers| numbers.hash(&mut hasher));
+    hasher.finish()
 }
 
-/// Arguments of runs that only print the hash of shallow's scenes, and of their surfaces.
-pub const HASH: &str = "hash-of-shallow";
-pub const SURFACES: &str = "hash-of-surfaces";
-
-/// Such a run.
+/// The run that prints the hash of scenes.
 pub fn print_hash() {
     println!("{:016x}", all(&context()));
 }
 
-/// The other one.
+/// The run that prints the hash of their surfaces.
 pub fn print_surfaces() {
     println!("{:016x}", surfaces(&context()));
-}
-
-/// The hash that a process with one set of instructions prints.
-fn hash_at(argument: &str, level: &str) -> Vec<u8> {
-    let program = std::env::current_exe().expect("this program's path");
-    let output = std::process::Command::new(program).arg(argument).env("FRAZIL_CPU", level).output();
-    output.expect("a process for shallow's scenes").stdout
 }

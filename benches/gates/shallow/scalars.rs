@@ -3,7 +3,6 @@
 use frazil::geometry::{DVec3, Vec3};
 use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::free_fall::Falls;
-use frazil::shallow::material::Liquid;
 use frazil::shallow::sources::Kind;
 use frazil::shallow::stains::Absorbing;
 use frazil::shallow::terrain::shapes::Shape;
@@ -12,6 +11,7 @@ use frazil::shallow::{Law, Scalar, Shallow, Staining, Stains};
 use crate::common::bodies::Dice;
 use crate::common::shallow::{Plan, Turn, busy, context};
 use crate::harness::{Harness, median};
+use crate::shallow::ground;
 use crate::shallow::speed::{five_floors, one_floor, thread_seconds};
 
 /// Steps of the run.
@@ -25,23 +25,10 @@ const TIMES: usize = 31;
 
 /// All of them.
 pub fn run(h: &mut Harness) {
-    if h.wants("shallow.scalars") {
-        let (wrong, note) = sums(false);
-        h.gate("shallow.scalars", wrong, &note);
-    }
-    if h.wants("shallow.mass_all") {
-        let (wrong, note) = sums(true);
-        h.gate("shallow.mass_all", wrong, &note);
-    }
-    type Make = fn() -> Shallow;
-    let scenes: [(&str, Make); 2] =
-        [("shallow.dyed_one_floor", one_floor), ("shallow.dyed_five_floors", five_floors)];
-    for (name, make) in scenes {
-        if h.wants(name) {
-            let (ratio, note) = slowdown(make);
-            h.gate(name, ratio, &note);
-        }
-    }
+    h.measure("shallow.scalars", || sums(false));
+    h.measure("shallow.mass_all", || sums(true));
+    h.measure("shallow.dyed_one_floor", || slowdown(one_floor));
+    h.measure("shallow.dyed_five_floors", || slowdown(five_floors));
 }
 
 /// A dye, an age, a warmth that goes, and a dye that is everywhere the same.
@@ -135,16 +122,7 @@ fn sums(is_all: bool) -> (f64, String) {
 fn change(liquid: &mut Shallow, dice: &mut Dice) {
     let poured = [dice.between(0.0, 1.0), dice.between(0.0, 100.0), dice.between(-50.0, 50.0), 0.5];
     liquid.set_poured(&poured).expect("concentrations");
-    for _ in 0..200 {
-        let column = dice.below(liquid.columns().len());
-        if liquid.columns().is_column(column) {
-            liquid.pour(column, dice.between(-2e-3, 1e-3));
-        }
-    }
-    let mut params = liquid.params().clone();
-    params.liquid = Liquid::new([0.0, 1e-6, 4e-6, 4e-5, 4e-1][dice.below(5)]);
-    params.gravity = [dice.between(-3.0, 3.0), -9.81, dice.between(-3.0, 3.0)];
-    liquid.set_params(params).expect("parameters");
+    ground::change(liquid, dice);
     // A ball dips in, and a pillar that leaves no room where it stands.
     let mut position =
         || DVec3::new(dice.between(-0.04, 0.04), dice.between(0.0, 0.03), dice.between(-0.025, 0.025));

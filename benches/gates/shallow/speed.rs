@@ -30,35 +30,26 @@ pub fn run(h: &mut Harness) {
         ("shallow.frame_three_floors", three_floors, 0.32),
     ];
     for (name, make, thesis) in scenes {
-        if h.wants(name) {
+        h.measure(name, || {
             let frames = Frames::of(&mut make());
             let note = format!("{cpu} thesis={thesis} ms on a GTX 970; {}", frames.note());
-            h.gate(name, frames.milliseconds(), &note);
-        }
+            (frames.milliseconds(), note)
+        });
     }
-    if h.wants("shallow.rate_200") {
-        let frames = Frames::of(&mut waving(200, 1e-3));
-        h.gate("shallow.rate_200", frames.rate(), &format!("{cpu} {}", frames.note()));
-    }
-    if h.wants("shallow.rate_4000") {
-        let frames = Frames::timed(&mut waving(4000, 1e-3), 1, |_| ());
-        h.gate("shallow.rate_4000", frames.rate(), &format!("{cpu} {}", frames.note()));
-    }
-    if h.wants("shallow.rate_scaled") {
-        let frames = drained();
-        h.gate("shallow.rate_scaled", frames.rate(), &format!("{cpu} {}", frames.note()));
-    }
-    if h.wants("shallow.puddle") {
-        let [all, puddle] = [false, true].map(|is_puddle| Frames::timed(&mut basin(is_puddle), 3, |_| ()));
-        let share = 100.0 * puddle.milliseconds() / all.milliseconds();
-        let note = format!("{cpu} {:.3} of {:.3} ms", puddle.milliseconds(), all.milliseconds());
-        h.gate("shallow.puddle", share, &note);
-    }
-    if h.wants("shallow.memory") {
+    let rated = |frames: Frames| (frames.rate(), format!("{cpu} {}", frames.note()));
+    h.measure("shallow.rate_200", || rated(Frames::of(&mut waving(200, 1e-3))));
+    h.measure("shallow.rate_4000", || rated(Frames::timed(&mut waving(4000, 1e-3), 1, |_| ())));
+    h.measure("shallow.rate_scaled", || rated(drained()));
+    h.measure("shallow.puddle", || {
+        let [all, puddle] =
+            [false, true].map(|is_puddle| Frames::timed(&mut basin(is_puddle), 3, |_| ()).milliseconds());
+        (100.0 * puddle / all, format!("{cpu} {puddle:.3} of {all:.3} ms"))
+    });
+    h.measure("shallow.memory", || {
         let each = |liquid: Shallow| liquid.bytes() as f64 / liquid.columns().count() as f64;
         let [one, five] = [one_floor(), five_floors()].map(each);
-        h.gate("shallow.memory", one.max(five), &format!("{one:.1} with one floor, {five:.1} with five"));
-    }
+        (one.max(five), format!("{one:.1} with one floor, {five:.1} with five"))
+    });
 }
 
 /// Blood in steps of at most so many seconds.

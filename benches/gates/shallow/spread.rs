@@ -4,9 +4,8 @@
 use frazil::shallow::Shallow;
 
 use crate::common::liquids::context;
-use crate::harness::Harness;
-use crate::plots::chart::{Axis, Plot};
-use crate::shallow::ground::{G, between, depth, dry, ground, pour, power, run_until, viscous};
+use crate::plots::Plot;
+use crate::shallow::ground::{G, between, depth, dry, even, ground, pour, power, ratios, run_until, viscous};
 
 const CELL: f64 = 1.0e-3;
 /// Viscosity (m2/s) and volume (m3).
@@ -23,10 +22,7 @@ const SHARE: f64 = 0.5;
 /// Directions in which it is measured.
 const DIRECTIONS: usize = 360;
 
-pub fn run(h: &mut Harness) {
-    if !h.wants("shallow.spread") {
-        return;
-    }
+pub fn measure() -> [(f64, String); 2] {
     let ctx = context(0);
     let count = 2 * (1.08 * LAST) as usize + 1;
     let solids = ground([count; 2], CELL, between(0.0, 0.1), |_| 0.01);
@@ -61,37 +57,21 @@ pub fn run(h: &mut Harness) {
         radii.push([time, mean]);
     }
     let exponent = (power(&radii) - 0.125).abs();
-    h.gate(
-        "shallow.spread_exponent",
-        exponent,
-        &format!("off 1/8; radii of {FIRST} to {LAST} cells, off theory by {off:.2} %"),
-    );
-    h.gate("shallow.spread_round", round, "greatest radius over least");
-    let theory = (0..=40)
-        .map(|i| FIRST * (LAST / FIRST).powf(f64::from(i) / 40.0) * CELL)
-        .map(|r| [time_at(r), 1e3 * r]);
-    Plot::new(
-        "Viscous puddle on level ground (Huppert 1982)",
-        Axis::log("time (s)"),
-        Axis::log("radius (mm)"),
-    )
-    .line("theory, power 1/8", theory)
-    .points("pipes", radii.iter().map(|[time, radius]| [*time, 1e3 * radius]))
-    .write("shallow_spread");
+    let note = format!("off 1/8; radii of {FIRST} to {LAST} cells, off theory by {off:.2} %");
+    let theory = ratios(FIRST * CELL, LAST * CELL, 40).map(|r| [time_at(r), 1e3 * r]);
+    Plot::log("Viscous puddle on level ground (Huppert 1982)", "time (s)", "radius (mm)")
+        .line("theory, power 1/8", theory)
+        .points("pipes", radii.iter().map(|[time, radius]| [*time, 1e3 * radius]))
+        .write("shallow_spread");
     let end = radii[radii.len() - 1][0];
-    let shape = (0..=100)
-        .map(|i| f64::from(i) / 100.0)
-        .map(|s| [1e3 * s * LAST * CELL, 1e3 * depth_at(s * LAST * CELL, end)]);
+    let shape = even(0.0, LAST * CELL, 100).map(|x| [1e3 * x, 1e3 * depth_at(x, end)]);
     let own = (0..count)
         .map(|x| [1e3 * (x as f64 + 0.5 - 0.5 * count as f64) * CELL, 1e3 * depth(&shallow, [x, count / 2])]);
-    Plot::new(
-        "Viscous puddle on level ground: its depth",
-        Axis::linear("from the middle (mm)"),
-        Axis::linear("depth (mm)"),
-    )
-    .line("theory", shape)
-    .points("pipes", own.filter(|[x, _]| *x > -1e-9))
-    .write("shallow_spread_shape");
+    Plot::linear("Viscous puddle on level ground: its depth", "from the middle (mm)", "depth (mm)")
+        .line("theory", shape)
+        .points("pipes", own.filter(|[x, _]| *x > -1e-9))
+        .write("shallow_spread_shape");
+    [(exponent, note), (round, "greatest radius over least".into())]
 }
 
 /// 0.894: (2^10 / (3^4 pi^3))^(1/8).

@@ -18,10 +18,8 @@ const FRAMES: usize = 40;
 
 /// All of them.
 pub fn run(h: &mut Harness) {
-    if h.wants("shallow.save") || h.wants("shallow.restore") {
-        times(h);
-    }
-    if h.wants("shallow.same_continued") {
+    h.measure_all(["shallow.save", "shallow.restore"], times);
+    h.measure("shallow.same_continued", || {
         let (mut saved, mut differ) = (0, Vec::new());
         for seed in 0..SCENES {
             let from = Dice(seed).below(FRAMES - 10);
@@ -37,12 +35,12 @@ pub fn run(h: &mut Harness) {
             }
         }
         let note = format!("{} runs, {saved} bytes of states; differ: {differ:?}", SCENES + 2);
-        h.holds("shallow.same_continued", differ.is_empty(), &note);
-    }
+        (differ.is_empty(), note)
+    });
 }
 
 /// Both times.
-fn times(h: &mut Harness) {
+fn times() -> [(f64, String); 2] {
     let ctx = context();
     let (mut liquid, mut other) = (five_floors(), five_floors());
     let mut state = Vec::new();
@@ -70,12 +68,10 @@ fn times(h: &mut Harness) {
         let worst = times.iter().copied().fold(0.0, f64::max);
         format!("{:?} {columns} columns, {} bytes; {least:.3} to {worst:.3} ms", cpu_level(), state.len())
     };
-    if h.wants("shallow.save") {
-        h.gate("shallow.save", median(save.clone()), &note(&save));
-    }
-    if h.wants("shallow.restore") {
-        h.gate("shallow.restore", median(restore.clone()), &note(&restore));
-    }
+    [save, restore].map(|times| {
+        let note = note(&times);
+        (median(times), note)
+    })
 }
 
 /// Whether a run that ends at a frame and another one, in columns made anew from its state, make the same bytes after each frame as the one

@@ -4,11 +4,12 @@ use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::Shallow;
 use frazil::shallow::columns::{Columns, NONE};
 use frazil::shallow::surface::rim::ledges::Ledges;
-use frazil::shallow::surface::{Counts, Depths, Indices, Layout, Surface, Target, bound, check};
+use frazil::shallow::surface::{Counts, Depths, Layout, Surface, check};
 
 use crate::common::bodies::Dice;
 use crate::common::shallow::{Turn, context, turnable};
 use crate::harness::{Harness, median};
+use crate::shallow::buffers::Buffers;
 use crate::shallow::speed::{five_floors, on_floors, one_floor, stacked, thread_seconds, three_floors};
 
 const FRAME: f64 = 1.0 / 60.0;
@@ -27,102 +28,28 @@ pub fn run(h: &mut Harness) {
         ("shallow.surface_three_floors", three_floors, 0.37),
     ];
     for (name, make, thesis) in scenes {
-        if h.wants(name) {
+        h.measure(name, || {
             let (time, note) = timed(&mut make());
-            let note = format!("{:?} thesis={thesis} ms on a GTX 970; {note}", cpu_level());
-            h.gate(name, time, &note);
-        }
+            (time, format!("{:?} thesis={thesis} ms on a GTX 970; {note}", cpu_level()))
+        });
     }
-    if h.wants("shallow.surface_copy") {
+    h.measure("shallow.surface_copy", || {
         let each = scenes.map(|(name, make, _)| {
             let [surface, copy] = copied(&mut make());
-            let note =
-                format!("{}: {surface:.3} ms, copy {copy:.3} ms", name.replace("shallow.surface_", ""));
-            (surface / copy, note)
+            let name = name.replace("shallow.surface_", "");
+            (surface / copy, format!("{name}: {surface:.3} ms, copy {copy:.3} ms"))
         });
         let most = each.iter().map(|(ratio, _)| *ratio).fold(0.0, f64::max);
-        let notes = each.map(|(_, note)| note).join("; ");
-        h.gate("shallow.surface_copy", most, &format!("{:?} {notes}", cpu_level()));
-    }
-    if h.wants("shallow.surface_unlinked") || h.wants("shallow.surface_cracks") {
-        unlinked(h);
-    }
-}
-
-/// The caller's buffers.
-struct Buffers {
-    positions: Vec<f32>,
-    normals: Vec<f32>,
-    depths: Vec<f32>,
-    velocities: Vec<f32>,
-    layers: Vec<u32>,
-    columns: Vec<u32>,
-    indices: Vec<u32>,
-}
-
-impl Buffers {
-    /// As large as any liquid in these columns needs them.
-    fn new(columns: &Columns) -> Self {
-        Self::with(columns, &Ledges::default())
-    }
-
-    /// The same, with skirts.
-    fn with(columns: &Columns, ledges: &Ledges) -> Self {
-        let (mut most, more) = (bound(columns), ledges.bound());
-        most.vertices += more.vertices;
-        most.indices += more.indices;
-        let [positions, normals, velocities] = [(); 3].map(|()| vec![0.0; 3 * most.vertices]);
-        Self {
-            positions,
-            normals,
-            depths: vec![0.0; most.vertices],
-            velocities,
-            layers: vec![0; most.vertices],
-            columns: vec![0; most.vertices],
-            indices: vec![0; most.indices],
-        }
-    }
-
-    /// What one needs to draw: positions, normals, depths for the opacity, triangles.
-    fn drawn(&mut self) -> Target<'_> {
-        Target {
-            positions: Some(&mut self.positions),
-            normals: Some(&mut self.normals),
-            depths: Some(&mut self.depths),
-            indices: Indices::U32(&mut self.indices),
-            ..Target::default()
-        }
-    }
-
-    /// What a check needs.
-    fn checked(&mut self) -> Target<'_> {
-        Target {
-            columns: Some(&mut self.columns),
-            indices: Indices::U32(&mut self.indices),
-            ..Target::default()
-        }
-    }
-
-    /// All of them.
-    fn all(&mut self) -> Target<'_> {
-        Target {
-            positions: Some(&mut self.positions),
-            normals: Some(&mut self.normals),
-            depths: Some(&mut self.depths),
-            velocities: Some(&mut self.velocities),
-            layers: Some(&mut self.layers),
-            columns: Some(&mut self.columns),
-            indices: Indices::U32(&mut self.indices),
-            ..Target::default()
-        }
-    }
+        (most, format!("{:?} {}", cpu_level(), each.map(|(_, note)| note).join("; ")))
+    });
+    h.measure_all(["shallow.surface_unlinked", "shallow.surface_cracks"], unlinked);
 }
 
 /// Median time of a surface that is drawn (ms) while the liquid flows, and what it and others cost.
 fn timed(liquid: &mut Shallow) -> (f64, String) {
     let mut surface = Surface::default();
     surface.reserve(liquid.columns());
-    let mut buffers = Buffers::new(liquid.columns());
+    let mut buffers = Buffers::new(liquid.columns(), &Ledges::default(), 0);
     let mut counts = Counts::default();
     let layout = Layout::default();
     let drawn = each_frame(liquid, |liquid| {
@@ -144,7 +71,7 @@ fn timed(liquid: &mut Shallow) -> (f64, String) {
     let least = drawn.iter().copied().fold(f64::INFINITY, f64::min);
     let worst = drawn.iter().copied().fold(0.0, f64::max);
     let note = format!(
-        "{} vertices, {} triangles; {least:.3} to {worst:.3} ms; {:.3} ms with the velocity, layer and column of each vertex",
+        "{} vertices, {} triangles; {least:.3} to {worst:.3} ms; {:.3} ms with the velocity, opacity, layer and column of each vertex",
         counts.vertices,
         counts.indices / 3,
         median(all)
@@ -156,7 +83,7 @@ fn timed(liquid: &mut Shallow) -> (f64, String) {
 fn copied(liquid: &mut Shallow) -> [f64; 2] {
     let mut surface = Surface::default();
     surface.reserve(liquid.columns());
-    let (mut to, mut from) = (Buffers::new(liquid.columns()), Buffers::new(liquid.columns()));
+    let [mut to, mut from] = [(); 2].map(|()| Buffers::new(liquid.columns(), &Ledges::default(), 0));
     // Memory that was never written is one page of zeros.
     for numbers in [&mut from.positions, &mut from.normals, &mut from.depths] {
         numbers.fill(1.0);
@@ -217,7 +144,7 @@ impl Pairs {
     fn look(&mut self, surface: &mut Surface, columns: &Columns, depth: &[i32]) {
         let mut ledges = Ledges::default();
         ledges.find(columns);
-        let mut buffers = Buffers::with(columns, &ledges);
+        let mut buffers = Buffers::new(columns, &ledges, 0);
         let depths = Depths { depth, ledges: Some(&ledges), ..Depths::default() };
         let counts =
             surface.build(columns, &depths, &Layout::default(), &mut buffers.checked()).expect("a surface");
@@ -280,7 +207,7 @@ fn open_edges(columns: &Columns, depth: &[i32], buffers: &Buffers, counts: &Coun
 }
 
 /// Random terrains with layers: liquid that flows there, and depths by chance, in part up to ceilings.
-fn unlinked(h: &mut Harness) {
+fn unlinked() -> [(f64, String); 2] {
     let ctx = context();
     let (mut pairs, mut surface, mut surfaces) = (Pairs::default(), Surface::default(), 0);
     let mut look = |columns: &Columns, depth: &[i32]| {
@@ -321,16 +248,11 @@ fn unlinked(h: &mut Harness) {
         look(liquid.columns(), liquid.depths());
     }
     let Pairs { edges, false_edges, missing, alone, open, cracks } = pairs;
-    let note = format!(
-        "{surfaces} surfaces, up to {layers} layers; of {edges} edges between wet columns {false_edges} join what is not linked; \
-         {missing} linked pairs without an edge, but {alone} that no third column is linked with"
+    let looked = format!("{surfaces} surfaces, up to {layers} layers");
+    let of_links = format!(
+        "{looked}; of {edges} edges between wet columns {false_edges} join what is not linked; {missing} linked pairs without an edge, but \
+         {alone} that no third column is linked with"
     );
-    if h.wants("shallow.surface_unlinked") {
-        h.gate("shallow.surface_unlinked", (false_edges + missing) as f64, &note);
-    }
-    if h.wants("shallow.surface_cracks") {
-        let note =
-            format!("{surfaces} surfaces, up to {layers} layers; without skirts {open} of {edges} edges");
-        h.gate("shallow.surface_cracks", cracks as f64, &note);
-    }
+    let of_cracks = format!("{looked}; without skirts {open} of {edges} edges");
+    [((false_edges + missing) as f64, of_links), (cracks as f64, of_cracks)]
 }

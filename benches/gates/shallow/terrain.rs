@@ -27,24 +27,19 @@ const CASTS: usize = 41;
 
 /// All of them.
 pub fn run(h: &mut Harness) {
-    if h.wants("shallow.terrain_wrong") {
-        against_windings(h);
-    }
+    h.measure("shallow.terrain_wrong", against_windings);
     let middle = (EDGE - BOX) / 2..(EDGE + BOX) / 2;
     let all = 0..EDGE;
     let terrains = terrains();
     let [sheet, sphere, spheres] = terrains.each_ref();
     // Each vertical line meets a sheet or a closed surface once or twice, and the many spheres some seven times.
-    time(h, "shallow.terrain_all", &all, &[sheet, sphere]);
-    time(h, "shallow.terrain_overlapping", &all, &[spheres]);
-    time(h, "shallow.terrain_box", &middle, &[sheet, sphere, spheres]);
+    h.measure("shallow.terrain_all", || time(&all, &[sheet, sphere]));
+    h.measure("shallow.terrain_overlapping", || time(&all, &[spheres]));
+    h.measure("shallow.terrain_box", || time(&middle, &[sheet, sphere, spheres]));
 }
 
 /// Times casts of the triangles of terrains through a box of cells: the slowest of them.
-fn time(h: &mut Harness, name: &str, cells: &Range<usize>, terrains: &[&(&str, TriMesh)]) {
-    if !h.wants(name) {
-        return;
-    }
+fn time(cells: &Range<usize>, terrains: &[&(&str, TriMesh)]) -> (f64, String) {
     let (mut worst, mut note) = (0.0, format!("{:?}", cpu_level()));
     for (which, mesh) in terrains {
         let (cast, moved) = timed(mesh, [cells.clone(), cells.clone()]);
@@ -53,11 +48,11 @@ fn time(h: &mut Harness, name: &str, cells: &Range<usize>, terrains: &[&(&str, T
         note +=
             &format!(" {which}, {count} triangles: {cast:.3} ms, {moved:.3} ms for liquid to move along;");
     }
-    h.gate(name, worst, note.trim_end_matches(';'));
+    (worst, note.trim_end_matches(';').to_string())
 }
 
 /// Lines through random solids.
-fn against_windings(h: &mut Harness) {
+fn against_windings() -> (f64, String) {
     let (mut differ, mut lines, mut layers, mut ties) = (0, 0, [0; 6], 0);
     for seed in 0..SOLIDS {
         let mut dice = Dice(100_000 + seed);
@@ -80,7 +75,7 @@ fn against_windings(h: &mut Harness) {
     let note = format!(
         "{SOLIDS} scenes of up to 6 solids, {lines} lines, {ties} through a vertex; with 0, 1, ... layers, and 5 or more: {layers:?}"
     );
-    h.gate("shallow.terrain_wrong", f64::from(u32::try_from(differ).expect("few lines")), &note);
+    (f64::from(u32::try_from(differ).expect("few lines")), note)
 }
 
 /// Terrains of 50,000 triangles over the whole domain.

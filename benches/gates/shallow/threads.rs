@@ -16,24 +16,24 @@ const DEPTH: f64 = 1e-3;
 /// Both gates.
 pub fn run(h: &mut Harness) {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    if h.wants("shallow.threads_gain") {
-        if cores < 2 {
-            h.skipped("shallow.threads_gain", "one core");
-        } else {
-            let (gains, note) = gains(&[(450, 50, 12), (1500, 15, 4)], |[one, two]| one / two);
-            h.gate("shallow.threads_gain", gains.into_iter().fold(f64::INFINITY, f64::min), &note);
+    if cores < 2 {
+        for name in ["shallow.threads_gain", "shallow.threads_few"] {
+            if h.wants(name) {
+                h.skipped(name, "one core");
+            }
         }
+        return;
     }
-    if h.wants("shallow.threads_few") {
-        if cores < 2 {
-            h.skipped("shallow.threads_few", "one core");
-        } else {
-            // Below the count of columns from which on a step is divided, and just above.
-            let (shares, note) =
-                gains(&[(200, 40, 60), (310, 40, 30), (330, 40, 30)], |[one, two]| two / one);
-            h.gate("shallow.threads_few", shares.into_iter().fold(0.0, f64::max), &note);
-        }
-    }
+    h.measure("shallow.threads_gain", || {
+        let (gains, note) = gains(&[(450, 50, 12), (1500, 15, 4)], |[one, two]| one / two);
+        (gains.into_iter().fold(f64::INFINITY, f64::min), note)
+    });
+    h.measure("shallow.threads_few", || {
+        // Below the count of columns from which on a step is divided, and just above.
+        let sizes = [(200, 40, 60), (310, 40, 30), (330, 40, 30)];
+        let (shares, note) = gains(&sizes, |[one, two]| two / one);
+        (shares.into_iter().fold(0.0, f64::max), note)
+    });
 }
 
 /// For each count of cells along an edge a ratio of the best frame on one thread and on two; in so many turns of so many frames.

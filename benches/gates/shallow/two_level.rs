@@ -9,6 +9,7 @@ use frazil::shallow::{Detail, Params};
 use crate::common::bodies::Dice;
 use crate::common::shallow::{context, covered, floors, ground, waves};
 use crate::harness::{Harness, median};
+use crate::shallow::ground::fate;
 use crate::shallow::speed::thread_seconds;
 
 /// Steps of the run for mass.
@@ -17,22 +18,18 @@ const FRAME: f64 = 1.0 / 60.0;
 
 /// Mass and cost.
 pub fn run(h: &mut Harness) {
-    if h.wants("shallow.detail_mass") {
-        mass(h);
-    }
+    h.measure("shallow.detail_mass", mass);
     // Strips of 16 cells begin at the near cells' sides.
     for (name, edge, near) in [
         ("shallow.detail_cost", 1000, [240..752, 256..744]),
         ("shallow.detail_cost_small", 200, [48..144, 48..152]),
     ] {
-        if h.wants(name) {
-            cost(h, name, edge, near);
-        }
+        h.measure(name, || cost(edge, near));
     }
 }
 
 /// Most units that were missing after a frame, or too many.
-fn mass(h: &mut Harness) {
+fn mass() -> (f64, String) {
     let ctx = context();
     let (cell, size) = (0.001, [60, 44]);
     let solids = floors(size, cell, [-0.02, 0.1], 2, |at @ [x, z], floor| {
@@ -67,18 +64,12 @@ fn mass(h: &mut Harness) {
         worst = worst.max(detail.balance().error.abs());
         frame += 1;
     }
-    let all = detail.balance();
-    let [poured, sourced, drained, absorbed, lost, inside] =
-        [all.poured, all.sourced, all.drained, all.absorbed, all.lost, all.inside].map(|volume| 1e6 * volume);
-    let note = format!(
-        "{steps} steps, {moves} moves; ml poured {poured:.1}, sourced {sourced:.1}, drained {drained:.1}, absorbed \
-         {absorbed:.1}, lost {lost:.1}, inside {inside:.1}"
-    );
-    h.gate("shallow.detail_mass", worst as f64, &note);
+    let note = format!("{steps} steps, {moves} moves; {}", fate(&detail.balance()));
+    (worst as f64, note)
 }
 
 /// The time of a frame over that of all cells being fine, in turns: on a domain of so many cells along an edge, of which a quarter is near.
-fn cost(h: &mut Harness, name: &str, edge: usize, near: Cells) {
+fn cost(edge: usize, near: Cells) -> (f64, String) {
     let ctx = context();
     let cell = 0.0005;
     let low = -0.5 * edge as f64 * cell;
@@ -107,5 +98,5 @@ fn cost(h: &mut Harness, name: &str, edge: usize, near: Cells) {
         cpu_level(),
         100.0 * share
     );
-    h.gate(name, detail / fine, &note);
+    (detail / fine, note)
 }

@@ -4,15 +4,14 @@ use std::f64::consts::PI;
 
 use frazil::Context;
 use frazil::numeric::cpu::cpu_level;
-use frazil::shallow::columns::grid::{BOTTOMLESS, Grid};
+use frazil::shallow::columns::grid::BOTTOMLESS;
 use frazil::shallow::params::{Friction, TimeStepping};
-use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
 
 use crate::common::shallow::{context, covered, ground, waves};
 use crate::harness::Harness;
-use crate::plots::chart::{Axis, Plot};
-use crate::shallow::ground::{G, between, viscous};
+use crate::plots::Plot;
+use crate::shallow::ground::{G, between, even, terrain, viscous};
 use crate::shallow::speed::Frames;
 
 /// Edge of a cell (m), cells across, how far gravity leans, and viscosity (m2/s).
@@ -35,16 +34,13 @@ pub fn run(h: &mut Harness) {
         ("shallow.channel_open", "shallow.channel_open_ground", false),
     ];
     for (name, without, is_closed) in kinds {
-        if h.wants(name) || h.wants(without) {
+        h.measure_all([name, without], || {
             let [own, thesis] =
                 [Friction::Walls, Friction::Ground].map(|friction| off(&ctx, is_closed, friction));
-            h.gate(name, own.0, &own.1);
-            h.gate(without, thesis.0, &format!("{}; friction at the ground only", thesis.1));
-        }
+            [own, (thesis.0, format!("{}; friction at the ground only", thesis.1))]
+        });
     }
-    if h.wants("shallow.duct_settles") {
-        settles(h, &ctx);
-    }
+    h.measure("shallow.duct_settles", || settles(&ctx));
     if h.wants("shallow.duct_closed") {
         plot(&ctx);
     }
@@ -66,9 +62,7 @@ impl Passage {
     /// Filled, and at rest.
     fn filled(self, ctx: &Context) -> Shallow {
         let heights = between(-0.02, 0.2);
-        let grid = Grid { cell: CELL, origin: [0.0; 2], size: [self.long, ACROSS + 2] };
-        let solids = |index: usize| {
-            let [x, z] = [index % self.long, index / self.long];
+        let solids = terrain([self.long, ACROSS + 2], CELL, heights, |[x, z]| {
             let floor = [BOTTOMLESS, heights.round(0.0)];
             if z == 0 || z == ACROSS + 1 {
                 vec![[BOTTOMLESS, heights.round(0.15)]]
@@ -77,8 +71,7 @@ impl Passage {
             } else {
                 vec![floor]
             }
-        };
-        let solids = Solids::new(grid, heights, (0..grid.cells()).map(solids));
+        });
         let params =
             Params { gravity: [LEAN * G, -G, 0.0], friction: self.friction, ..viscous(self.viscosity) };
         let mut liquid = Shallow::new(ctx, &solids, params).expect("a passage");
@@ -187,7 +180,7 @@ fn off(ctx: &Context, is_closed: bool, friction: Friction) -> (f64, String) {
 }
 
 /// Honey that begins to flow is steady at once; how long passages of it take to come to 99 %, in steps of 1 ms.
-fn settles(h: &mut Harness, ctx: &Context) {
+fn settles(ctx: &Context) -> (f64, String) {
     let (mut worst, mut notes) = (0.0f64, Vec::new());
     for (is_closed, name) in [(true, "a duct"), (false, "a channel")] {
         let all = Passage { viscosity: 0.04, ..passage(1.0, is_closed, Friction::Walls) }.run(ctx, 400);
@@ -196,20 +189,20 @@ fn settles(h: &mut Harness, ctx: &Context) {
         worst = worst.max(steps as f64);
         notes.push(format!("{name} 1:1: {steps}"));
     }
-    h.gate("shallow.duct_settles", worst, &format!("{}; 0.04 m2/s, steps of 1 ms", notes.join(", ")));
+    (worst, format!("{}; 0.04 m2/s, steps of 1 ms", notes.join(", ")))
 }
 
 fn plot(ctx: &Context) {
-    let mut plot = Plot::new(
+    let mut plot = Plot::linear(
         "Passages of 8 x 8 cells: velocity over the height",
-        Axis::linear("from the middle (mm)"),
-        Axis::linear("velocity (mm/s)"),
+        "from the middle (mm)",
+        "velocity (mm/s)",
     );
     for (is_closed, name) in [(true, "a closed duct"), (false, "an open channel")] {
         let own = passage(1.0, is_closed, Friction::Walls);
         let all = own.run(ctx, 600);
         let wide = 0.5 * ACROSS as f64 * CELL;
-        let curve = (-40..=40).map(|i| wide * f64::from(i) / 40.0).map(|y| [1e3 * y, 1e3 * own.profile(y)]);
+        let curve = even(-wide, wide, 80).map(|y| [1e3 * y, 1e3 * own.profile(y)]);
         let position = |z: usize| 1e3 * CELL * (z as f64 + 0.5 - 0.5 * ACROSS as f64);
         let points = all[599].iter().enumerate().map(|(z, u)| [position(z), 1e3 * u]);
         plot = plot.line(&format!("theory, {name}"), curve).points(&format!("pipes, {name}"), points);
@@ -235,12 +228,11 @@ fn costs(h: &mut Harness) {
         ("shallow.walls_frame_thick", 1e-3, false),
     ];
     for (name, viscosity, is_narrow) in scenes {
-        if h.wants(name) {
+        h.measure(name, || {
             let [own, ground] = [Friction::Walls, Friction::Ground]
                 .map(|friction| Frames::of(&mut slope(friction, viscosity, is_narrow)).milliseconds());
-            let note =
-                format!("{:?} {viscosity} m2/s; {ground:.3} ms without, {:.2} x", cpu_level(), own / ground);
-            h.gate(name, own, &note);
-        }
+            let level = cpu_level();
+            (own, format!("{level:?} {viscosity} m2/s; {ground:.3} ms without, {:.2} x", own / ground))
+        });
     }
 }

@@ -2,16 +2,18 @@
 
 use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::columns::Columns;
-use frazil::shallow::free_fall::mesh::{self as drops, Balls};
+use frazil::shallow::free_fall::mesh::Balls;
 use frazil::shallow::free_fall::{Droplet, Falls};
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::TimeStepping;
-use frazil::shallow::surface::{Depths, Indices, Layout, Surface, Target, bound};
+use frazil::shallow::surface::rim::ledges::Ledges;
+use frazil::shallow::surface::{Depths, Layout, Surface};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
 
 use crate::common::shallow::{context, covered, ground, waves};
 use crate::harness::{Harness, median};
+use crate::shallow::buffers::Buffers;
 use crate::shallow::speed::{stacked, thread_seconds};
 
 const FRAME: f64 = 1.0 / 60.0;
@@ -31,10 +33,10 @@ pub fn run(h: &mut Harness) {
         ("shallow.whole_three_floors", || falling(&stacked(100, 0.001, 3, true), 0.009), 0.69),
     ];
     for (name, make, thesis) in scenes {
-        if h.wants(name) {
+        h.measure(name, || {
             let (time, note) = timed(&mut make());
-            h.gate(name, time, &format!("{:?} thesis={thesis} ms on a GTX 970; {note}", cpu_level()));
-        }
+            (time, format!("{:?} thesis={thesis} ms on a GTX 970; {note}", cpu_level()))
+        });
     }
 }
 
@@ -58,56 +60,29 @@ struct Drawn {
     surface: Surface,
     balls: Balls,
     drops: Vec<Droplet>,
-    positions: Vec<f32>,
-    normals: Vec<f32>,
-    depths: Vec<f32>,
-    indices: Vec<u32>,
+    buffers: Buffers,
     layout: Layout,
 }
 
 impl Drawn {
     fn new(columns: &Columns, most: usize) -> Self {
-        let mut surface = Surface::default();
+        let (mut surface, mut balls) = (Surface::default(), Balls::default());
         surface.reserve(columns);
-        let mut balls = Balls::default();
         balls.reserve(most);
-        let (flat, round) = (bound(columns), drops::bound(most));
-        let vertices = flat.vertices.max(round.vertices);
         let layout = Layout { fade_depth: 0.02 * columns.grid.cell, ..Layout::default() };
-        let [positions, normals] = [(); 2].map(|()| vec![0.0; 3 * vertices]);
-        Self {
-            surface,
-            balls,
-            drops: Vec::with_capacity(most),
-            positions,
-            normals,
-            depths: vec![0.0; vertices],
-            indices: vec![0; flat.indices.max(round.indices)],
-            layout,
-        }
+        let buffers = Buffers::new(columns, &Ledges::default(), most);
+        Self { surface, balls, drops: Vec::with_capacity(most), buffers, layout }
     }
 
     /// Writes the surface, and then the drops; returns the count of drops.
     fn draw(&mut self, liquid: &Shallow) -> usize {
+        let Self { surface, balls, drops, buffers, layout } = self;
         let depths = Depths { depth: liquid.depths(), active: Some(liquid.active()), ..Depths::default() };
-        let mut target = Target {
-            positions: Some(&mut self.positions),
-            normals: Some(&mut self.normals),
-            depths: Some(&mut self.depths),
-            indices: Indices::U32(&mut self.indices),
-            ..Target::default()
-        };
-        self.surface.build(liquid.columns(), &depths, &self.layout, &mut target).expect("a surface");
-        self.drops.clear();
-        self.drops.extend(liquid.drops());
-        let mut target = drops::Target {
-            positions: Some(&mut self.positions),
-            normals: Some(&mut self.normals),
-            indices: Indices::U32(&mut self.indices),
-            ..drops::Target::default()
-        };
-        self.balls.build(&self.drops, &self.layout, &mut target).expect("drops");
-        self.drops.len()
+        surface.build(liquid.columns(), &depths, layout, &mut buffers.drawn()).expect("a surface");
+        drops.clear();
+        drops.extend(liquid.drops());
+        balls.build(drops, layout, &mut buffers.drops()).expect("drops");
+        drops.len()
     }
 }
 

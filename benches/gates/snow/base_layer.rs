@@ -13,17 +13,14 @@ const CELL: f64 = 0.005;
 
 /// All of them.
 pub fn run(h: &mut Harness) {
-    exact(h);
-    left(h);
+    h.measure_all(["snow.base.exact_base", "snow.base.exact_removed"], exact);
+    h.measure("snow.base.left", left);
     volume(h);
-    islands(h);
+    h.measure("snow.base.islands", islands);
 }
 
 /// Snow and removed snow against max(phi, -s) and max(phi, s) of exact distances: a ball that turns, half sunk.
-fn exact(h: &mut Harness) {
-    if !h.wants("snow.base.exact") {
-        return;
-    }
+fn exact() -> [(f64, &'static str); 2] {
     let ctx = context(2);
     let at = [DVec3::new(-0.2, 0.3, 0.0), DVec3::new(0.2, 0.3, 0.0)];
     let turn = [DVec3::zeros(), DVec3::new(0.1, 0.2, 0.2)];
@@ -43,15 +40,11 @@ fn exact(h: &mut Harness) {
     };
     let snow = worst(base.surface(), &|phi, s| phi.max(-s));
     let removed = worst(base.removed(), &|phi, s| phi.max(s));
-    h.gate("snow.base.exact_base", snow, "");
-    h.gate("snow.base.exact_removed", removed, "");
+    [(snow, ""), (removed, "")]
 }
 
 /// Snow left deeper than half a cell inside the poses of a box that moves and turns.
-fn left(h: &mut Harness) {
-    if !h.wants("snow.base.left") {
-        return;
-    }
+fn left() -> (f64, &'static str) {
     let ctx = context(2);
     let start = DVec3::new(0.7, 1.9, 3.1);
     let motion = MovingBox {
@@ -74,7 +67,7 @@ fn left(h: &mut Harness) {
             }
         }
     }
-    h.gate("snow.base.left", left as f64, "");
+    (left as f64, "")
 }
 
 fn mesh_volume(ctx: &frazil::Context, grid: &FloatGrid) -> f64 {
@@ -134,10 +127,7 @@ fn growth(old: &FloatGrid, new: &FloatGrid) -> u64 {
 }
 
 /// Islands that the noise makes: parts of the snow with it, less parts without it.
-fn islands(h: &mut Harness) {
-    if !h.wants("snow.base.islands") {
-        return;
-    }
+fn islands() -> (f64, &'static str) {
     let ctx = context(2);
     let bodies = scenes::walkers();
     let parts = |params: Params| {
@@ -153,5 +143,5 @@ fn islands(h: &mut Harness) {
         parts
     };
     let made = (parts(Params::for_cell(WALK_CELL)) - parts(scenes::EXACT)).max(0);
-    h.gate("snow.base.islands", made as f64, "at frames 12, 24, 36, 48");
+    (made as f64, "at frames 12, 24, 36, 48")
 }

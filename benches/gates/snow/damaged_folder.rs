@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
 use crate::common::character::moments;
-use crate::harness::Harness;
+use crate::process::frazil;
 
 /// Flips in all.
 const FLIPS: usize = 200;
@@ -21,11 +21,8 @@ const OUTPUTS: [&str; 4] = [
 ];
 const FOLDERS: [&str; 6] = ["", "base", "removed", "objects", "state", "report"];
 
-/// All of them.
-pub fn run(h: &mut Harness) {
-    if !h.wants("reliability.flip") {
-        return;
-    }
+/// Flips after which wrong frames were made, and those that are not named.
+pub fn measure() -> [(f64, String); 2] {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut wrong, mut unnamed) = (Vec::new(), Vec::new());
     let (mut refused, mut harmless) = (0, 0);
@@ -46,10 +43,9 @@ pub fn run(h: &mut Harness) {
             }
         }
     }
-    let note = format!("{refused} runs refused, {harmless} made the right frames; {}", wrong.join(" "));
-    h.gate("reliability.flip_wrong", wrong.len() as f64, note.trim());
-    let note = format!("of {FLIPS} flips in all files of 4 folders; {}", unnamed.join(" "));
-    h.gate("reliability.flip_unnamed", unnamed.len() as f64, note.trim());
+    let of_wrong = format!("{refused} runs refused, {harmless} made the right frames; {}", wrong.join(" "));
+    let of_unnamed = format!("of {FLIPS} flips in all files of 4 folders; {}", unnamed.join(" "));
+    [(wrong.len() as f64, of_wrong), (unnamed.len() as f64, of_unnamed)]
 }
 
 /// A folder of a shot, as it was made, and as it is after it grew.
@@ -85,9 +81,8 @@ impl Shot {
     }
 
     fn snow(&self, frames: i32) -> Output {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_frazil"));
-        let scene = self.folder.join(format!("{frames}.toml"));
-        command.arg("snow").arg(scene).arg("-o").arg(self.out()).arg("-q").output().expect("frazil")
+        let scene = format!("{frames}.toml");
+        frazil(["snow", &scene, "-o", "out", "-q"]).current_dir(&self.folder).output().expect("frazil")
     }
 
     /// The files of the folder by name; empty ones cannot be damaged.
@@ -125,8 +120,7 @@ impl Shot {
 
     /// Whether `frazil check` names the file.
     fn is_named(&self, name: &str) -> bool {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_frazil"));
-        let said = command.arg("check").arg(self.out()).output().expect("frazil");
+        let said = frazil(["check"]).arg(self.out()).output().expect("frazil");
         said.status.code() == Some(1)
             && String::from_utf8_lossy(&said.stdout).contains(&format!("damaged   {name}"))
     }

@@ -1,15 +1,10 @@
 //! Gates of scenes far from the origin: the demonstration's walk, moved by whole cells.
 
 use frazil::geometry::DVec3;
-use frazil::motion::{Key, Keys, Rigid};
-use frazil::snow::base_layer::initial::{Cover, Ground, layer};
-use frazil::snow::base_layer::{BaseLayer, Params};
-use frazil::sweep::Body;
+use frazil::snow::base_layer::Params;
 
-use crate::common::boot::{left_boot, right_boot};
-use crate::common::walk::walk;
 use crate::harness::Harness;
-use crate::scenes::{self, WALK_CELL, context};
+use crate::scenes::{self, WALK_CELL, context, layer};
 
 /// Cells that the scene is moved by: 1.2 km and 60 km.
 const POSITIONS: [i32; 2] = [160_000, 8_000_000];
@@ -61,19 +56,8 @@ fn volumes(cells: i32, params: Params) -> Vec<(f64, f64)> {
     let ctx = context(2);
     let along = f64::from(cells) * WALK_CELL;
     let area = [along - HALF, along - HALF, along + HALF, along + HALF];
-    let ground = Ground::Plane { height: 0.0, area };
-    let snow = layer(&ctx, &ground, &[], &Cover::Depth(0.3), WALK_CELL, 3.0).expect("snow");
-    let mut base = BaseLayer::new(&ctx, snow, params).expect("base layer");
-    let walker = |(mesh, side)| {
-        let keys = walk(side, FRAMES, 0.08).into_iter().map(|step| Key {
-            time: f64::from(step.frame),
-            at: DVec3::from(step.at) + DVec3::new(along, 0.0, along - 1.5),
-            turn: DVec3::from(step.turn_deg.map(f64::to_radians)),
-        });
-        let keys = Keys::new(keys.collect()).expect("keys");
-        Body::new(Box::new(Rigid::new(mesh, keys)), 1.0).expect("body")
-    };
-    let bodies = [(left_boot(), 1.0), (right_boot(), -1.0)].map(walker);
+    let mut base = layer(&ctx, 0.0, area, 0.3, WALK_CELL, params);
+    let bodies = scenes::walkers_at(DVec3::new(along, 0.0, along));
     let step = |frame: i32| {
         let from = f64::from((frame - 1).max(1));
         let report = base.step(&ctx, &bodies, from, f64::from(frame), frame).expect("step");

@@ -4,14 +4,13 @@ use std::time::Instant;
 
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Character, Key, Keys, Placed, Play, Space};
-use frazil::snow::grains::{Base, Grains, Object, Params, Surroundings};
+use frazil::snow::grains::{Grains, Object, Params, Surroundings};
 use frazil::sweep::Body;
 
-use crate::common::character::data;
 use crate::harness::Harness;
-use crate::scenes::context;
-use crate::snow::grains::FRAME;
-use crate::snow::grains::memory::kilobytes;
+use crate::process::kilobytes;
+use crate::scenes::{MAN, context, wanted_data};
+use crate::snow::grains::{FRAME, ON_A_FLOOR};
 
 /// Radius (m): twice that of examples/scenes/grains_walk.toml.
 const RADIUS: f64 = 0.005;
@@ -26,13 +25,7 @@ const AWAKE: i32 = 2;
 
 pub fn run(h: &mut Harness) {
     let name = "snow.grains.walk_particles";
-    if !h.wants(name) {
-        return;
-    }
-    let Some(man) = data("character/CesiumMan.glb") else {
-        h.skipped(name, "no data");
-        return;
-    };
+    let Some(man) = wanted_data(h, &[name], MAN) else { return };
     let [count, resting, _] = seconds(&man, true, SETTLE, WALK);
     let [_, awake, memory] = seconds(&man, false, 1, AWAKE);
     let note = format!(
@@ -61,21 +54,14 @@ fn seconds(man: &std::path::Path, rests: bool, settle: i32, walk: i32) -> [f64; 
     for frame in 1 - settle..=walk {
         let objects = [Object::new(&body, 0.3)];
         let objects = if frame <= 0 { &objects[..0] } else { &objects[..] };
-        let around = Surroundings {
-            base: Base::Missing,
-            objects,
-            statics: &[&walls],
-            ground: &[],
-            floor: Some(0.0),
-            lowest: -1.0,
-        };
+        let around = Surroundings { objects, statics: &[&walls], ..ON_A_FLOOR };
         let times = [frame - 1, frame].map(|frame| f64::from(frame.max(0)) * FRAME);
         let times = if frame <= 0 { [0.0, FRAME] } else { times };
         let start = Instant::now();
         grains.step(&ctx, &around, times, frame).expect("a step");
         taken += if frame > 0 { start.elapsed().as_secs_f64() } else { 0.0 };
     }
-    [grains.ids().len() as f64, taken / f64::from(walk), kilobytes("VmHWM:")]
+    [grains.ids().len() as f64, taken / f64::from(walk), kilobytes("self", "VmHWM:")]
 }
 
 /// Hexagonal layers of grains, alternately shifted, spaced as in a close packing.

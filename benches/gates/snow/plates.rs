@@ -1,28 +1,18 @@
 //! Gate of the volume that flat-sided bodies remove, against what they cut out of the snow.
 
 use frazil::geometry::DVec3;
-use frazil::snow::base_layer::BaseLayer;
-use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 
 use crate::common::shapes::cuboid;
-use crate::harness::Harness;
-use crate::scenes::{EXACT, body, context};
+use crate::scenes::{EXACT, body, context, layer};
+use crate::snow::mist::frame_rate::numbers;
 
 /// Edge of a cell, and depth of the snow (m): those of a scene of a few boots.
 const CELL: f64 = 0.01;
 const DEPTH: f64 = 0.15;
 
-pub fn run(h: &mut Harness) {
-    let name = "snow.base.plates";
-    if !h.wants(name) {
-        return;
-    }
+pub fn measure() -> (f64, String) {
     let ctx = context(2);
-    let mut seed = 3u64;
-    let mut next = || {
-        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (seed >> 40) as f64 / f64::from(1 << 24)
-    };
+    let mut next = numbers(3);
     let (mut worst, mut which, mut sum) = (0.0f64, String::new(), 0.0);
     for plate in 0..100 {
         let size = [(3.0 + 5.0 * next()) * CELL, 0.4, (20.0 + 20.0 * next()) * CELL];
@@ -31,9 +21,7 @@ pub fn run(h: &mut Harness) {
         let height = CELL * next();
         let sole = height + if is_down { 0.0 } else { (2.0 + 5.0 * next()) * CELL };
         let at = DVec3::new(CELL * next(), sole + 0.2, CELL * next());
-        let ground = Ground::Plane { height, area: [-0.35, -0.35, 0.35, 0.35] };
-        let snow = layer(&ctx, &ground, &[], &Cover::Depth(DEPTH), CELL, 3.0).expect("snow");
-        let mut base = BaseLayer::new(&ctx, snow, EXACT).expect("a base layer");
+        let mut base = layer(&ctx, height, [-0.35, -0.35, 0.35, 0.35], DEPTH, CELL, EXACT);
         let body = body(cuboid(size.map(|x| x as f32)), [at; 2], [turn; 2], 1.0);
         let report = base.step(&ctx, &[body], 0.0, 1.0, 1).expect("a step");
         let exact = size[0] * size[2] * (height + DEPTH - sole);
@@ -49,5 +37,5 @@ pub fn run(h: &mut Harness) {
             which = format!("{off:+.2} % of plate {plate} of {:.1} cells ({turned}, {down})", size[0] / CELL);
         }
     }
-    h.gate(name, worst, &format!("{which}; mean {:+.2} %", sum / 100.0));
+    (worst, format!("{which}; mean {:+.2} %", sum / 100.0))
 }

@@ -1,7 +1,6 @@
 //! Gates of characters and shots: skinned sweeps, whole passes with files, continuing.
 
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use frazil::geometry::DVec3;
@@ -14,7 +13,8 @@ use frazil::vdb::file;
 use crate::common::character::{self, data};
 use crate::common::clients;
 use crate::harness::{Harness, median, timed};
-use crate::scenes::context;
+use crate::process::{frazil, json, quiet, works};
+use crate::scenes::{MAN, context, wanted_data};
 use crate::sweep::pose_union::Union;
 use crate::sweep::walls::each_voxel;
 
@@ -25,29 +25,10 @@ const THESIS: &str = "thesis=756 s";
 
 /// All of them.
 pub fn run(h: &mut Harness) {
-    let names = [
-        "sweep",
-        "skinning",
-        "edit",
-        "pass",
-        "memory",
-        "check",
-        "continued",
-        "rebuilt",
-        "changed",
-        "clients",
-    ];
-    if !names.iter().any(|name| h.wants(&format!("snow.shot.{name}"))) {
-        return;
-    }
-    let Some(man) = data("character/CesiumMan.glb") else {
-        for name in names.map(|name| format!("snow.shot.{name}")) {
-            if h.wants(&name) {
-                h.skipped(&name, "no data");
-            }
-        }
-        return;
-    };
+    let names = "sweep skinning edit pass memory check continued rebuilt changed clients".split(' ');
+    let names: Vec<String> = names.map(|name| format!("snow.shot.{name}")).collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let Some(man) = wanted_data(h, &names, MAN) else { return };
     sweeps(h, &man);
     skinning(h, &man);
     edit(h, &man);
@@ -149,13 +130,6 @@ fn edit(h: &mut Harness, man: &Path) {
     h.gate("snow.shot.edit", median(times), &note);
 }
 
-/// The program, with its output thrown away.
-fn frazil(arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_frazil"));
-    command.args(arguments).stdout(Stdio::null()).stderr(Stdio::null());
-    command
-}
-
 fn text(path: &Path) -> &str {
     path.to_str().expect("a path in UTF-8")
 }
@@ -173,10 +147,8 @@ fn pass(h: &mut Harness, man: &Path) {
         let (out, report) = (folder.path().join("out"), folder.path().join("report.json"));
         let arguments =
             ["snow", text(&scene), "-o", text(&out), "--threads", "2", "-q", "--report", text(&report)];
-        let (took, noisy) = timed(|| assert!(frazil(&arguments).status().expect("frazil").success()));
-        let text = std::fs::read_to_string(&report).expect("a report");
-        let report: serde_json::Value = serde_json::from_str(&text).expect("JSON");
-        let peak = report["peak_memory_bytes"].as_f64().expect("a peak") / f64::from(1 << 20);
+        let (took, noisy) = timed(|| works(&mut frazil(arguments)));
+        let peak = json(&report)["peak_memory_bytes"].as_f64().expect("a peak") / f64::from(1 << 20);
         let note = format!("240 frames, 6 x 6 m, with files; threads=2 {THESIS}{noisy}");
         h.gate(&pass, took, &note);
         h.gate(&memory, peak, "");
@@ -187,7 +159,7 @@ fn pass(h: &mut Harness, man: &Path) {
 fn check(h: &mut Harness, man: &Path) {
     let folder = tempfile::tempdir().expect("a folder");
     let seconds = |scene: &Path| {
-        let run = || timed(|| assert!(frazil(&["check", text(scene)]).status().expect("frazil").success())).0;
+        let run = || timed(|| works(&mut frazil(["check", text(scene)]))).0;
         median((0..5).map(|_| run()).collect())
     };
     if h.wants("snow.shot.check_walk") {
@@ -211,14 +183,13 @@ fn continued(h: &mut Harness, man: &Path) {
         let name = format!("snow.shot.continued_{mode}");
         let scene = character::walk_scene(folder.path(), man, 120, 0.015, &format!("base_mode = \"{mode}\""));
         let [once, killed] = ["once", "killed"].map(|name| folder.path().join(format!("{name}_{mode}")));
-        let (took, _) = timed(|| {
-            assert!(frazil(&["snow", text(&scene), "-o", text(&once)]).status().expect("frazil").success())
-        });
+        let (took, _) = timed(|| works(&mut frazil(["snow", text(&scene), "-o", text(&once)])));
         whole.push(once.clone());
         let mut kills = 0;
         for moment in character::moments(10) {
             let start = Instant::now();
-            let mut child = frazil(&["snow", text(&scene), "-o", text(&killed)]).spawn().expect("frazil");
+            let mut child =
+                quiet(&mut frazil(["snow", text(&scene), "-o", text(&killed)])).spawn().expect("frazil");
             // Short enough that ten of them do not finish the shot.
             let limit = Duration::from_secs_f64(0.02 + 0.25 * took * moment);
             while start.elapsed() < limit && child.try_wait().expect("a child").is_none() {
@@ -227,7 +198,7 @@ fn continued(h: &mut Harness, man: &Path) {
             kills += usize::from(child.kill().is_ok());
             child.wait().expect("a child");
         }
-        assert!(frazil(&["snow", text(&scene), "-o", text(&killed)]).status().expect("frazil").success());
+        works(&mut frazil(["snow", text(&scene), "-o", text(&killed)]));
         let same = character::output(&once) == character::output(&killed);
         h.holds(&name, same, &format!("{kills} kills, a run takes {took:.1} s"));
     }
@@ -237,7 +208,7 @@ fn continued(h: &mut Harness, man: &Path) {
         let frame = 1 + (moment * 119.0) as i32;
         let file = folder.path().join("rebuilt.vdb");
         let arguments = ["vdb", "rebuild", text(delta), "--frame", &frame.to_string(), "-o", text(&file)];
-        same &= frazil(&arguments).status().expect("frazil").success();
+        same &= quiet(&mut frazil(arguments)).status().expect("frazil").success();
         same &= voxels(&file) == voxels(&full.join(format!("base/base.{frame:04}.vdb")));
     }
     h.holds("snow.shot.rebuilt", same, "5 frames, values and active voxels of all three grids");
@@ -266,8 +237,7 @@ fn changed(h: &mut Harness, man: &Path) {
     let scene = character::walk_scene(folder.path(), man, 120, 0.03, "");
     let out = folder.path().join("out");
     let run = |more: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_frazil"));
-        command.args(["snow", text(&scene), "-o", text(&out), "-q"]).args(more).output().expect("frazil")
+        frazil(["snow", text(&scene), "-o", text(&out), "-q"]).args(more).output().expect("frazil")
     };
     let made = run(&[]).status.success();
     let before = character::output(&out);
@@ -293,7 +263,7 @@ fn clients(h: &mut Harness, man: &Path) {
     let folder = tempfile::tempdir().expect("a folder");
     let scene = character::walk_scene(folder.path(), man, 24, 0.02, "objects = [\"usd\"]");
     let out = folder.path().join("out");
-    assert!(frazil(&["snow", text(&scene), "-o", text(&out)]).status().expect("frazil").success());
+    works(&mut frazil(["snow", text(&scene), "-o", text(&out)]));
     let blender = clients::blender().map(|blender| clients::blender_opens(&blender, &out, 1, 24));
     let usd = clients::usd_python().map(|python| clients::usd_composes(&python, &out, 1, 24));
     for (name, answer) in [("snow.shot.clients_blender", blender), ("snow.shot.clients_usd", usd)] {

@@ -8,6 +8,7 @@ use frazil::vdb::{FloatGrid, level_set};
 use rayon::prelude::*;
 
 use crate::harness::{Harness, median, timed};
+use crate::process::{kilobytes, number_of, own, printed};
 use crate::scenes::{self, FRAMES, context};
 
 /// Seconds of each of five frames of a scene, after the first pose and a frame to warm up.
@@ -40,7 +41,7 @@ pub fn run(h: &mut Harness) {
         h.gate("snow.base.large", seconds, &note);
         let bytes = base.surface().memory_bytes() as f64 / base.surface().active_voxels() as f64;
         h.gate("snow.base.memory_voxel", bytes, "stock=12-14");
-        let peak = peak_of_large();
+        let peak = number_of(&printed(&mut own("peak-of-large")), "MB ").expect("a peak");
         h.gate("snow.base.memory_peak", peak, "stock=370; a process of its own, the layer's making included");
         let (stock, noisy) = timed(|| stock(&ctx, &body, &base));
         let note = format!("stock {stock:.2} s{noisy}");
@@ -52,28 +53,12 @@ pub fn run(h: &mut Harness) {
     }
 }
 
-/// Argument of a run that only makes the frames of `large` and prints its peak of memory (MB).
-pub const PEAK: &str = "peak-of-large";
-
-/// Such a run.
+/// The run that makes the frames of `large` and prints its peak of memory (MB).
 pub fn print_peak() {
     let ctx = context(2);
     let (mut base, body) = scenes::large(&ctx, 6.0);
     frame_times(&ctx, &mut base, &body);
-    println!("{}", peak_megabytes());
-}
-
-/// The peak of memory of `large` in a process of its own (MB).
-fn peak_of_large() -> f64 {
-    let program = std::env::current_exe().expect("this program's path");
-    let output = std::process::Command::new(program).arg(PEAK).output().expect("a process for `large`");
-    String::from_utf8_lossy(&output.stdout).trim().parse().expect("a number of MB")
-}
-
-fn peak_megabytes() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap_or("0");
-    line.split_whitespace().next().and_then(|kilobytes| kilobytes.parse::<f64>().ok()).unwrap_or(0.0) / 1024.0
+    println!("MB {}", kilobytes("self", "VmHWM:") / 1024.0);
 }
 
 /// The thesis' step with OpenVDB's default tools: 9 poses, dilated, smoothed, advected by noise, cut out.

@@ -2,7 +2,7 @@
 //! over each shot, by when the reports of a pass were written.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, SystemTime};
 
 use frazil::io::mesh;
@@ -10,6 +10,7 @@ use frazil::io::mesh;
 use crate::common::character::data;
 use crate::common::sleigh::sleigh;
 use crate::harness::Harness;
+use crate::process::{frazil, json, kilobytes};
 
 /// The gate of the greatest memory of all stages of the walk.
 const PEAK: &str = "snow.shot.peak_3_11";
@@ -18,8 +19,8 @@ const COUNTED: usize = 8;
 
 /// A scene of the table.
 struct Scene {
-    /// Gates of grains only, and of whole frames.
-    gates: [&'static str; 2],
+    /// Its number there, by which its gates are called.
+    number: &'static str,
     /// Name of the scene in examples/scenes.
     file: &'static str,
     /// File of its object in the test data; none: the sleigh.
@@ -31,74 +32,33 @@ struct Scene {
     thesis: [f64; 2],
 }
 
-const SCENES: [Scene; 7] = {
-    const fn scene(
-        gates: [&'static str; 2],
-        file: &'static str,
-        object: Option<&'static str>,
-        [compression, mist_cell]: [f64; 2],
-        thesis: [f64; 2],
-    ) -> Scene {
-        Scene { gates, file, object, compression, mist_cell, thesis }
-    }
-    let bunny = Some("mesh/stanford-bunny.obj");
-    let [man, robot] = [Some("character/CesiumMan.glb"), Some("character/RobotExpressive.glb")];
-    [
-        scene(
-            ["snow.grains.table_3_8a", "snow.shot.table_3_8a"],
-            "grains_imprint",
-            bunny,
-            [0.0, 0.005],
-            [11.6, 19.5],
-        ),
-        scene(
-            ["snow.grains.table_3_8b", "snow.shot.table_3_8b"],
-            "grains_imprint",
-            bunny,
-            [0.75, 0.005],
-            [4.4, 11.3],
-        ),
-        scene(
-            ["snow.grains.table_3_9a", "snow.shot.table_3_9a"],
-            "grains_slide",
-            bunny,
-            [0.0, 0.005],
-            [81.3, 92.1],
-        ),
-        scene(
-            ["snow.grains.table_3_9b", "snow.shot.table_3_9b"],
-            "grains_slide",
-            bunny,
-            [0.75, 0.005],
-            [15.9, 23.8],
-        ),
-        scene(
-            ["snow.grains.table_3_10", "snow.shot.table_3_10"],
-            "grains_sleigh",
-            None,
-            [0.0, 0.015],
-            [33.7, 38.5],
-        ),
-        scene(
-            ["snow.grains.table_3_11", "snow.shot.table_3_11"],
-            "grains_walk",
-            man,
-            [0.0, 0.01],
-            [11.3, 21.1],
-        ),
-        scene(
-            ["snow.grains.table_3_12", "snow.shot.table_3_12"],
-            "grains_roll",
-            robot,
-            [0.0, 0.01],
-            [39.3, 57.5],
-        ),
-    ]
-};
+const fn scene(
+    number: &'static str,
+    file: &'static str,
+    object: Option<&'static str>,
+    [compression, mist_cell]: [f64; 2],
+    thesis: [f64; 2],
+) -> Scene {
+    Scene { number, file, object, compression, mist_cell, thesis }
+}
+
+const BUNNY: Option<&str> = Some("mesh/stanford-bunny.obj");
+const MAN: Option<&str> = Some("character/CesiumMan.glb");
+const ROBOT: Option<&str> = Some("character/RobotExpressive.glb");
+const SCENES: [Scene; 7] = [
+    scene("3_8a", "grains_imprint", BUNNY, [0.0, 0.005], [11.6, 19.5]),
+    scene("3_8b", "grains_imprint", BUNNY, [0.75, 0.005], [4.4, 11.3]),
+    scene("3_9a", "grains_slide", BUNNY, [0.0, 0.005], [81.3, 92.1]),
+    scene("3_9b", "grains_slide", BUNNY, [0.75, 0.005], [15.9, 23.8]),
+    scene("3_10", "grains_sleigh", None, [0.0, 0.015], [33.7, 38.5]),
+    scene("3_11", "grains_walk", MAN, [0.0, 0.01], [11.3, 21.1]),
+    scene("3_12", "grains_roll", ROBOT, [0.0, 0.01], [39.3, 57.5]),
+];
 
 pub fn run(h: &mut Harness) {
     for scene in &SCENES {
-        let mut names = scene.gates.to_vec();
+        let [grains, shot] = scene.gates();
+        let mut names = vec![grains.as_str(), &shot];
         names.extend(scene.has_peak().then_some(PEAK));
         if !names.iter().any(|name| h.wants(name)) {
             continue;
@@ -112,6 +72,11 @@ pub fn run(h: &mut Harness) {
 }
 
 impl Scene {
+    /// Names of the gates of grains only, and of whole frames.
+    fn gates(&self) -> [String; 2] {
+        ["grains", "shot"].map(|part| format!("snow.{part}.table_{}", self.number))
+    }
+
     fn object_in(&self, folder: &Path) -> Option<PathBuf> {
         match self.object {
             Some(object) => data(object),
@@ -129,56 +94,44 @@ impl Scene {
     }
 
     fn measure(&self, h: &mut Harness, object: &Path, out: &Path) {
-        let [grains, shot] = self.gates;
+        let [grains, shot] = &self.gates();
         let is_whole = h.wants(shot) || self.has_peak() && h.wants(PEAK);
         let stages: &[&'static str] =
             if is_whole { &["base", "grains", "mist"] } else { &["base", "grains"] };
         let peaks: Vec<f64> = stages.iter().map(|stage| self.run(object, out, stage)).collect();
         let passes: Vec<Pass> = stages.iter().map(|stage| Pass::of(out, stage)).collect();
         let [thesis, whole] = self.thesis;
-        if h.wants(grains) {
-            h.gate(grains, passes[1].mean(), &passes[1].note(out, thesis));
-        }
-        if h.wants(shot) {
-            let parts: Vec<String> = stages
-                .iter()
-                .zip(&passes)
-                .map(|(stage, pass)| format!("{stage} {:.2}", pass.mean()))
-                .collect();
-            let sum = passes.iter().map(Pass::mean).sum();
+        h.measure(grains, || (passes[1].mean(), passes[1].note(out, thesis)));
+        let of_stages = |numbers: &[f64]| {
+            let each = stages.iter().zip(numbers).map(|(stage, number)| format!("{stage} {number:.2}"));
+            each.collect::<Vec<String>>().join(", ")
+        };
+        h.measure(shot, || {
+            let means: Vec<f64> = passes.iter().map(Pass::mean).collect();
             let cpu = frazil::numeric::cpu::cpu_level();
-            h.gate(
-                shot,
-                sum,
-                &format!("threads=2 cpu={cpu:?} thesis={whole} s on 6 cores; {}", parts.join(", ")),
-            );
-        }
-        if self.has_peak() && h.wants(PEAK) {
-            let most = peaks.iter().copied().fold(0.0, f64::max);
-            let each: Vec<String> =
-                stages.iter().zip(&peaks).map(|(stage, peak)| format!("{stage} {peak:.2}")).collect();
-            h.gate(PEAK, most, &each.join(", "));
+            let note = format!("threads=2 cpu={cpu:?} thesis={whole} s on 6 cores; {}", of_stages(&means));
+            (means.iter().sum::<f64>(), note)
+        });
+        if self.has_peak() {
+            h.measure(PEAK, || (peaks.iter().copied().fold(0.0, f64::max), of_stages(&peaks)));
         }
     }
 
     /// Makes a stage; its greatest memory (GB).
     fn run(&self, object: &Path, out: &Path, stage: &str) -> f64 {
         let scene = format!("{}/examples/scenes/{}.toml", env!("CARGO_MANIFEST_DIR"), self.file);
-        let mut run = Command::new(env!("CARGO_BIN_EXE_frazil"));
-        run.arg("snow").arg(scene).arg("-o").arg(out).args(["-q", "--threads", "2", "--stage", stage]);
+        let mut run = frazil(["snow", &scene, "-q", "--threads", "2", "--stage", stage, "-o"]);
+        run.arg(out);
         run.args(["--set", &format!("object.1.file={}", object.display())]);
         run.args(["--set", &format!("grains.compression={}", self.compression)]);
         if stage == "mist" {
             run.args(["--set", "mist.falling=false", "--set", &format!("mist.cell={}", self.mist_cell)]);
         }
         let mut child = run.stderr(Stdio::null()).spawn().expect("frazil");
-        let status = format!("/proc/{}/status", child.id());
+        let process = child.id().to_string();
         let mut peak = 0.0f64;
         loop {
-            let text = std::fs::read_to_string(&status).unwrap_or_default();
-            let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-            let kilobytes = line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok());
-            peak = peak.max(kilobytes.unwrap_or(0.0) * 1024.0 / 1e9);
+            peak = peak.max(kilobytes(&process, "VmHWM:") * 1024.0 / 1e9);
             if let Some(status) = child.try_wait().expect("a child") {
                 assert!(status.success(), "stage {stage}");
                 return peak;
@@ -218,9 +171,7 @@ impl Pass {
     /// What a pass of grains did; `thesis` is its time (s) there.
     fn note(&self, out: &Path, thesis: f64) -> String {
         let number = |frame: usize, name: &str| {
-            let text = std::fs::read(record(out, self.stage, frame)).expect("a report");
-            let report: serde_json::Value = serde_json::from_slice(&text).expect("a report");
-            report[name].as_f64().expect("a number")
+            json(&record(out, self.stage, frame))[name].as_f64().expect("a number")
         };
         let last = self.ends.len();
         let awake: f64 = (2..=last).map(|frame| number(frame, "grains") - number(frame, "resting")).sum();

@@ -2,23 +2,21 @@
 //! returns, and that it left all as it was.
 
 use std::cell::Cell;
-use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 
 use frazil::capi::mesh::triangles::*;
 use frazil::capi::tracker::eased::frz_tracker_read_eased;
 use frazil::capi::tracker::follower::*;
 use frazil::capi::tracker::mesh::*;
-use frazil::capi::{frz_span, frz_status, frz_view};
+use frazil::capi::{frz_span, frz_status};
 use frazil::geometry::{DVec3, TriMesh, Vec3};
 
 use crate::capi::cancel_latency::{Steps, measure};
-use crate::capi::host::{Threads, view, works, written};
+use crate::capi::host::{self, Threads, sized, usual, view, works, written};
 use crate::common::liquids::{ball, context, filled, own_surface, turned};
 use crate::harness::Harness;
 use crate::snow::grains::Random;
 
-const NO_VIEW: frz_view = frz_view { data: null(), count: 0, stride: 0 };
 /// Initial distance between particles (m), and time between frames (s).
 const SPACING: f64 = 0.01;
 const FRAME: f64 = 1.0 / 24.0;
@@ -46,12 +44,7 @@ struct Host {
 
 impl Host {
     fn new(places: [Vec<DVec3>; 2], mesh: &TriMesh, is_rebuilt: bool) -> Self {
-        let mut params = MaybeUninit::<frz_tracker_params>::uninit();
-        // SAFETY: the pointer is valid, and the parameters are filled before they are read.
-        let mut params = unsafe {
-            works(frz_tracker_params_init(params.as_mut_ptr(), size_of::<frz_tracker_params>()));
-            params.assume_init()
-        };
+        let mut params = usual(frz_tracker_params_init);
         params.spacing = SPACING;
         params.rebuild = u32::from(is_rebuilt);
         let mut host = Self {
@@ -65,19 +58,10 @@ impl Host {
             positions: places.map(|places| places.iter().map(|place| (*place).into()).collect()),
         };
         let corners: Vec<[f32; 3]> = mesh.positions.iter().map(|place| (*place).into()).collect();
-        let desc = frz_mesh_desc {
-            struct_size: size_of::<frz_mesh_desc>() as u32,
-            flags: 0,
-            positions: view(&corners),
-            face_counts: NO_VIEW,
-            indices: view(mesh.triangles.as_flattened()),
-            attributes: null(),
-            attribute_count: 0,
-        };
+        host.mesh = host::mesh(host.threads.ctx, &corners, &mesh.triangles);
         let mut tracker = null_mut();
         // SAFETY: the pointers are valid.
         unsafe {
-            works(frz_mesh_create(host.threads.ctx, &desc, &mut host.mesh));
             let first = host.particles(0);
             works(frz_tracker_create(
                 host.threads.ctx,
@@ -95,13 +79,9 @@ impl Host {
     }
 
     fn particles(&self, frame: usize) -> frz_particles {
-        frz_particles {
-            struct_size: size_of::<frz_particles>() as u32,
-            flags: 0,
-            positions: view(&self.positions[frame]),
-            velocities: NO_VIEW,
-            ids: view(&self.ids),
-        }
+        let mut particles: frz_particles = sized();
+        (particles.positions, particles.ids) = (view(&self.positions[frame]), view(&self.ids));
+        particles
     }
 
     /// Makes a step, and puts the tracker back if it was not cancelled; `report` may be null.
@@ -242,9 +222,7 @@ fn rebuilding(h: &mut Harness) {
     let positions = GAPS.map(at);
     let mesh = own_surface(&context(2), &positions[0], SPACING);
     let host = Host::new(positions, &mesh, true);
-    // SAFETY: it is made of numbers.
-    let mut report: frz_tracker_report = unsafe { std::mem::zeroed() };
-    report.struct_size = size_of::<frz_tracker_report>() as u32;
+    let mut report: frz_tracker_report = sized();
     works(host.step_told(&mut report));
     if report.rebuilt_cells == 0 {
         for name in names {

@@ -2,13 +2,12 @@
 //! a part listed that the mesh does not cover (it has no vertices).
 
 use frazil::Context;
-use frazil::geometry::{DVec3, TriMesh};
-use frazil::surface::{Implicit, Isosurface, Params, Tracker};
+use frazil::geometry::TriMesh;
+use frazil::geometry::check::topology::bodies;
+use frazil::surface::{Params, Tracker};
 
-use crate::common::liquids::{context, numbered};
+use crate::common::liquids::{context, numbered, own_surface};
 use crate::common::made_sets::{Set, sets};
-use crate::harness::Harness;
-use crate::surface::spot::parts;
 
 /// Initial distance between particles (m), and time between frames (s).
 const SPACING: f64 = 0.01;
@@ -16,11 +15,7 @@ const FRAME: f64 = 1.0 / 24.0;
 /// Most frames of a set.
 const FRAMES: usize = 60;
 
-pub fn run(h: &mut Harness) {
-    let name = "surface.early";
-    if !h.wants(name) {
-        return;
-    }
+pub fn measure() -> (f64, String) {
     let ctx = context(2);
     let mut lags = Vec::new();
     for set in sets() {
@@ -35,12 +30,7 @@ pub fn run(h: &mut Harness) {
         });
     }
     let worst = lags.iter().copied().fold(0.0, f64::max);
-    h.gate(name, worst, &format!("balls, dumbbell, sheet, bubble: {lags:?}"));
-}
-
-fn surface(ctx: &Context, positions: &[DVec3]) -> TriMesh {
-    let phi = Implicit::new(ctx, positions, SPACING, 0.5 * SPACING).expect("a surface");
-    Isosurface::new(&phi).mesh(&phi)
+    (worst, format!("balls, dumbbell, sheet, bubble: {lags:?}"))
 }
 
 /// The first frame at which the particles' own surface has other parts or handles, and the first at which a step tells of it.
@@ -50,14 +40,14 @@ fn frames(ctx: &Context, set: &Set) -> (Option<usize>, Option<usize>) {
             set.positions.iter().map(|position| (set.motion)(*position, frame as f64) * SPACING).collect(),
         )
     };
-    let kind = |surface: &TriMesh| (parts(surface), surface.euler_characteristic());
-    let first = surface(ctx, &at(0).positions);
+    let kind = |surface: &TriMesh| (bodies(&surface.triangles).len(), surface.euler_characteristic());
+    let first = own_surface(ctx, &at(0).positions, SPACING);
     let begin = kind(&first);
     let mut tracker = Tracker::new(ctx, Params::for_spacing(SPACING), &first, &at(0)).expect("a tracker");
     let (mut change, mut flag) = (None, None);
     for frame in 1..FRAMES {
         let (from, to) = (at(frame - 1), at(frame));
-        if change.is_none() && kind(&surface(ctx, &to.positions)) != begin {
+        if change.is_none() && kind(&own_surface(ctx, &to.positions, SPACING)) != begin {
             change = Some(frame);
         }
         let report = tracker.step(ctx, &from, &to, FRAME).expect("a step");

@@ -4,21 +4,21 @@ use std::time::Instant;
 
 use frazil::Context;
 use frazil::geometry::DVec3;
-use frazil::surface::{Implicit, Isosurface, Params, Particles, StepReport, Tracker};
+use frazil::surface::{Params, Particles, StepReport, Tracker};
 
 use crate::common::liquids::{
-    Ball, Errors, Random, ball, context, filled, follow, numbered, once_around, turned,
+    Ball, Errors, Random, ball, context, filled, follow, numbered, once_around, own_surface, turned,
 };
-use crate::harness::Harness;
+use crate::harness::{Harness, median};
 
 const FRAME: f64 = 1.0 / 24.0;
 
 pub fn run(h: &mut Harness) {
     known_motions(h);
     still(h);
-    far(h);
-    pool(h);
-    half_space(h);
+    h.measure("surface.far", far);
+    h.measure_all(["surface.pool_mean", "surface.pool_p95"], pool);
+    h.measure("surface.half_space", half_space);
     speed(h);
 }
 
@@ -103,11 +103,7 @@ fn still(h: &mut Harness) {
 }
 
 /// The same liquid 1 km from the origin, its particles in 32 bits as files hold them.
-fn far(h: &mut Harness) {
-    let name = "surface.far";
-    if !h.wants(name) {
-        return;
-    }
+fn far() -> (f64, &'static str) {
     let ctx = context(2);
     // Spacing 0.1 m; a whole number of cells away.
     let near = ball(8.0, 30, 0.25);
@@ -132,15 +128,11 @@ fn far(h: &mut Harness) {
         tracker.vertices().iter().map(|vertex| vertex - by).collect::<Vec<_>>()
     };
     let off = run(DVec3::zeros()).iter().zip(run(by)).map(|(a, b)| (a - b).norm()).sum::<f64>();
-    h.gate(name, off / near.mesh.positions.len() as f64 / 0.1, "mean after 10 frames");
+    (off / near.mesh.positions.len() as f64 / 0.1, "mean after 10 frames")
 }
 
 /// A pool at rest whose particles tremble by up to 0.02 spacings: how far vertices move from frame to frame.
-fn pool(h: &mut Harness) {
-    let names = ["surface.pool_mean", "surface.pool_p95"];
-    if !names.iter().any(|name| h.wants(name)) {
-        return;
-    }
+fn pool() -> [(f64, &'static str); 2] {
     let ctx = context(2);
     let ball = ball(8.0, 30, 0.25);
     let mut random = Random(5);
@@ -165,23 +157,17 @@ fn pool(h: &mut Harness) {
         from = to;
     }
     ways.sort_unstable_by(f64::total_cmp);
-    h.gate(names[0], ways.iter().sum::<f64>() / ways.len() as f64, "20 frames");
-    h.gate(names[1], ways[ways.len() * 95 / 100], "20 frames");
+    [(ways.iter().sum::<f64>() / ways.len() as f64, "20 frames"), (ways[ways.len() * 95 / 100], "20 frames")]
 }
 
 /// Where the surface of a half-space lies above its outermost particles.
-fn half_space(h: &mut Harness) {
-    let name = "surface.half_space";
-    if !h.wants(name) {
-        return;
-    }
+fn half_space() -> (f64, &'static str) {
     let ctx = context(2);
     let positions = filled(1.0, 0.0, 12.0, |position| position.y < 0.0);
-    let phi = Implicit::new(&ctx, &positions, 1.0, 0.5).expect("phi");
-    let mesh = Isosurface::new(&phi).mesh(&phi);
+    let mesh = own_surface(&ctx, &positions, 1.0);
     let middle = mesh.positions.iter().filter(|p| p.x.abs() < 4.0 && p.z.abs() < 4.0 && p.y > -5.0);
     let most = middle.map(|p| f64::from((p.y + 0.5 - 0.48).abs())).fold(0.0, f64::max);
-    h.gate(name, most, "from 0.48 spacings above the outermost centres");
+    (most, "from 0.48 spacings above the outermost centres")
 }
 
 /// Times of the phases, on one thread, with as many particles and triangles as the thesis' dragon and its falling objects.
@@ -194,7 +180,7 @@ fn speed(h: &mut Harness) {
         for ((name, phase), thesis) in names.iter().zip(phases).zip([1.17, 3.01, 1.39, 1.24]) {
             if h.wants(name) {
                 let note = format!("threads=1 cpu={cpu:?} thesis={thesis} s");
-                h.gate(name, median(reports.iter().map(|(_, report)| time(report, phase))), &note);
+                h.gate(name, median(reports.iter().map(|(_, report)| time(report, phase)).collect()), &note);
             }
         }
     }
@@ -202,12 +188,12 @@ fn speed(h: &mut Harness) {
         let reports = steps(&context(1), &ball(39.5, 176, 0.25));
         let each = |(_, report): &(f64, StepReport)| phases.iter().map(|phase| time(report, phase)).sum();
         let note = format!("threads=1 cpu={cpu:?} thesis=48 s without meshing");
-        h.gate("surface.time_260k", median(reports.iter().map(each)), &note);
+        h.gate("surface.time_260k", median(reports.iter().map(each).collect()), &note);
     }
     if h.wants("surface.threads") {
         let ball = ball(39.5, 176, 0.25);
-        let [one, two] =
-            [1, 2].map(|threads| median(steps(&context(threads), &ball).iter().map(|(time, _)| *time)));
+        let [one, two] = [1, 2]
+            .map(|threads| median(steps(&context(threads), &ball).iter().map(|(time, _)| *time).collect()));
         h.gate("surface.threads", one / two, &format!("{one:.2} s and {two:.2} s"));
     }
 }
@@ -235,10 +221,4 @@ pub fn steps_with(ctx: &Context, ball: &Ball, params: Params, count: usize) -> V
 /// Seconds of a phase of a step.
 pub fn time(report: &StepReport, phase: &str) -> f64 {
     report.phases.iter().find(|time| time.name == phase).map_or(0.0, |time| time.time.as_secs_f64())
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_unstable_by(f64::total_cmp);
-    values[values.len() / 2]
 }

@@ -1,7 +1,6 @@
 //! Gates of particle caches: other programs find the same particles in them, and damaged ones do no harm.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 
 use frazil::geometry::DVec3;
 use frazil::geometry::points::{Column, Points, Values};
@@ -14,12 +13,12 @@ use rayon::prelude::*;
 
 use crate::common::caches::{IDS, POSITIONS, VELOCITIES, samples};
 use crate::common::{character, clients};
-use crate::files::damage;
 use crate::harness::Harness;
+use crate::process::{frazil, works};
+use crate::reliability::damage;
 use crate::scenes::context;
 
 const SAME: &str = "surface.readers_same";
-const CRASHES: &str = "surface.readers_crashes";
 /// Files of other programs, below `particles` of the outside data.
 const OUTSIDE: [&str; 9] = [
     "bunny_frame_14_7705_particles.vtk",
@@ -51,9 +50,7 @@ pub fn run(h: &mut Harness) {
     if h.wants(SAME) {
         same(h);
     }
-    if h.wants(CRASHES) {
-        crashes(h);
-    }
+    h.measure("surface.readers_crashes", crashes);
 }
 
 /// A particle: identity and position (m).
@@ -99,12 +96,12 @@ fn same(h: &mut Harness) {
 
 /// A file of particles as another that the command writes.
 fn converted(input: &Path, output: PathBuf) -> PathBuf {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_frazil"));
-    command.arg("convert").arg(input).arg(&output).arg("-q").stderr(Stdio::null());
+    let mut command = frazil(["convert", "-q"]);
+    command.arg(input).arg(&output);
     if extension(&output) == "vdb" {
         command.args(["--voxel", VOXEL]);
     }
-    assert!(command.status().expect("frazil").success(), "{command:?}");
+    works(&mut command);
     output
 }
 
@@ -143,7 +140,7 @@ fn are_same(path: &Path, ours: &[Particle], theirs: &[Particle]) -> bool {
     !ours.is_empty() && ours.len() == theirs.len() && ours.iter().zip(theirs).all(is_same)
 }
 
-fn crashes(h: &mut Harness) {
+fn crashes() -> (f64, String) {
     let (mut accepted, mut failed) = (Vec::new(), Vec::new());
     let one = |ending: &&'static str| {
         let tried = damage::tried(&format!("{KIND}{ending}"), INPUTS);
@@ -160,7 +157,7 @@ fn crashes(h: &mut Harness) {
         failed.extend(tried.failed.iter().map(|which| format!(".{ending} {which}")));
     }
     let note = format!("{INPUTS} inputs of each, accepted: {} {}", accepted.join(", "), failed.join(", "));
-    h.gate(CRASHES, failed.len() as f64, note.trim());
+    (failed.len() as f64, note)
 }
 
 /// Small intact files with an extension.

@@ -9,9 +9,9 @@ use std::time::Instant;
 
 use frazil::Context;
 use frazil::geometry::{DVec3, TriMesh};
-use frazil::surface::{Implicit, Isosurface, Params, Particles, StepReport, Tracker};
+use frazil::surface::{Params, Particles, StepReport, Tracker};
 
-use crate::common::liquids::{context, filled, numbered};
+use crate::common::liquids::{context, filled, numbered, surface_on};
 use crate::harness::{Harness, median};
 use crate::surface::known_motion::time;
 use crate::surface::rebuilt_sequences::CELL;
@@ -100,7 +100,7 @@ pub fn run(h: &mut Harness) {
             h.gate(name, seconds, &format!("{note} thesis={thesis} s"));
         }
     }
-    fine(h);
+    h.measure("surface.match_fine", fine);
 }
 
 /// A mesh with the spacing of the scenes that is rebuilt.
@@ -110,11 +110,7 @@ pub fn params() -> Params {
 
 /// Matching alone, of the thesis' gazelle on cells of r / 4 (Table 2.1): what is flagged, and the signs of the whole grid, are counted
 /// too.
-fn fine(h: &mut Harness) {
-    let name = "surface.match_fine";
-    if !h.wants(name) {
-        return;
-    }
+fn fine() -> (f64, String) {
     let ctx = context(1);
     let scene = Scene { steps: FINE_FRAMES, ..gazelle(&ctx) };
     let steps = scene.follow(&ctx, Params { cell: FINE, ..params() });
@@ -122,7 +118,7 @@ fn fine(h: &mut Harness) {
     let (whole, note) = scene.told(&steps);
     let note =
         format!("flag and match; cells of {FINE} r, whole frames {whole:.2} s; {note} thesis=155.79 s");
-    h.gate(name, seconds, &note);
+    (seconds, note)
 }
 
 /// The median of what some steps took; NaN without any.
@@ -185,10 +181,7 @@ impl Scene {
 
 /// The surface of particles at positions (m) as a mesh of about so many triangles, with detail of its own.
 fn detailed(ctx: &Context, positions: &[DVec3], triangles: usize) -> TriMesh {
-    let on = |cell: f64| {
-        let phi = Implicit::new(ctx, positions, SPACING, cell * SPACING).expect("a surface");
-        Isosurface::new(&phi).mesh(&phi)
-    };
+    let on = |cell: f64| surface_on(ctx, positions, SPACING, cell);
     // A surface has so many triangles as its area has faces of cells, nearly.
     let share = (on(CELL).triangles.len() as f64 / triangles as f64).sqrt();
     let mut mesh = on((CELL * share).clamp(0.15, 1.0));

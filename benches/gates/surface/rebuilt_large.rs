@@ -1,18 +1,13 @@
 //! Gates of a mesh that is rebuilt where large liquids merge: as many particles and triangles as in the thesis' largest scene, and a
 //! million, whose memory is that of a process of its own.
 
-use std::process::{Command, Stdio};
-
 use frazil::geometry::{DVec3, TriMesh};
 
 use crate::common::liquids::{ball, context};
 use crate::common::shapes::welded;
 use crate::harness::Harness;
-use crate::snow::grains::memory::kilobytes;
+use crate::process::{kilobytes, number_of, own, printed};
 use crate::surface::rebuilt_frames::{DETAIL, Lump, SPACING, Scene, flying, params};
-
-/// Argument of a run that only follows the million, and prints what that took.
-pub const MILLION: &str = "rebuilt-million";
 
 /// Radius of the seven objects (spacings), squares along an edge of their meshes' six faces, steps; how far two objects come nearer to
 /// each other in each (spacings), those of the million too.
@@ -29,40 +24,26 @@ const GAP: f64 = 2.5;
 const MERGING: usize = 5;
 
 pub fn run(h: &mut Harness) {
-    let name = "surface.frame_260k";
-    if h.wants(name) {
+    h.measure("surface.frame_260k", || {
         let scene = objects();
         let (seconds, note) = scene.told(&scene.follow(&context(1), params()));
-        h.gate(name, seconds, &format!("{note} thesis=63.4 s"));
-    }
-    let names @ [time, memory] = ["surface.frame_million", "surface.rebuilt_memory"];
-    if !names.iter().any(|name| h.wants(name)) {
-        return;
-    }
-    let program = std::env::current_exe().expect("this program's path");
-    let mut run = Command::new(program);
-    let output = run.arg(MILLION).stderr(Stdio::inherit()).output().expect("a process for the million");
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    let told =
-        |key: &str| text.lines().find_map(|line| line.strip_prefix(key)).expect("what the million took");
-    let number = |key: &str| told(key).parse::<f64>().expect("a number");
-    if h.wants(time) {
-        h.gate(time, number("seconds "), told("note "));
-    }
-    if h.wants(memory) {
-        h.gate(
-            memory,
-            number("gigabytes "),
-            "the peak of a process with mesh and particles, the making of both included; steps alone, without easing, arrays and files",
-        );
-    }
+        (seconds, format!("{note} thesis=63.4 s"))
+    });
+    h.measure_all(["surface.frame_million", "surface.rebuilt_memory"], || {
+        let text = printed(&mut own("rebuilt-million"));
+        let number = |key: &str| number_of(&text, key).expect("what the million took");
+        let note = text.lines().find_map(|line| line.strip_prefix("note ")).expect("a note");
+        let of_memory = "the peak of a process with mesh and particles, the making of both included; steps alone, without easing, arrays \
+                         and files";
+        [(number("seconds "), note.to_string()), (number("gigabytes "), of_memory.into())]
+    });
 }
 
-/// The run with [`MILLION`].
+/// The run that follows the million, and prints what that took.
 pub fn print_million() {
     let scene = million();
     let (seconds, note) = scene.told(&scene.follow(&context(1), params()));
-    println!("seconds {seconds}\nnote {note}\ngigabytes {}", kilobytes("VmHWM:") * 1024.0 / 1e9);
+    println!("seconds {seconds}\nnote {note}\ngigabytes {}", kilobytes("self", "VmHWM:") * 1024.0 / 1e9);
 }
 
 /// The falling objects (Fig. 2.12): viscous objects that fall on top of one another and merge. The thesis matched their topology in 38 %

@@ -8,21 +8,15 @@ use crate::common::bodies::models;
 use crate::common::repaired::failures;
 use crate::harness::Harness;
 
-const FUZZ: &str = "surface.repair_fuzz";
-const FIT: &str = "surface.cubes_fit";
 /// How many meshes are repaired; fewer where `FRAZIL_FUZZ` says so.
 const MESHES: u64 = 10_000;
 
 pub fn run(h: &mut Harness) {
-    if h.wants(FIT) {
-        fit(h);
-    }
-    if h.wants(FUZZ) {
-        fuzz(h);
-    }
+    h.measure("surface.cubes_fit", fit);
+    h.measure("surface.repair_fuzz", fuzz);
 }
 
-fn fuzz(h: &mut Harness) {
+fn fuzz() -> (f64, String) {
     let count = std::env::var("FRAZIL_FUZZ").ok().and_then(|text| text.parse().ok()).unwrap_or(MESHES);
     let (start, models) = (Instant::now(), models());
     let failed = failures(0..count, &models, |failure| println!("# {failure}"));
@@ -31,11 +25,11 @@ fn fuzz(h: &mut Harness) {
         models.len(),
         start.elapsed().as_secs_f64()
     );
-    h.gate(FUZZ, failed.len() as f64, &note);
+    (failed.len() as f64, note)
 }
 
 /// All patterns of the 12 corners of two cubes with a common face, one behind the other on each axis.
-fn fit(h: &mut Harness) {
+fn fit() -> (bool, String) {
     let (mut gaps, mut lines) = (0, 0);
     for pattern in 0..1usize << 12 {
         for axis in 0..3 {
@@ -49,7 +43,7 @@ fn fit(h: &mut Harness) {
             lines += behind.len();
         }
     }
-    h.holds(FIT, gaps == 0, &format!("{gaps} gaps in 3 x 4096 pairs, {lines} lines on their common faces"));
+    (gaps == 0, format!("{gaps} gaps in 3 x 4096 pairs, {lines} lines on their common faces"))
 }
 
 /// Which corners of a cube are inside: of the first or the second along an axis, whose 12 corners a pattern says plane by plane.

@@ -2,21 +2,25 @@
 //! command with its files, on one thread, with the same cells and the same radius of influence.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-use std::time::Instant;
+use std::process::Command;
 
 use frazil::geometry::DVec3;
 use frazil::geometry::points::Points;
 use frazil::io::particles;
 
 use crate::common::liquids::Random;
-use crate::harness::{Harness, median};
+use crate::harness::{Harness, median, timed};
+use crate::process::{frazil, works};
 
 /// Gates, with the count of particles along an edge of their block.
 const GATES: [(&str, i32); 3] =
     [("surface.splashsurf_20k", 27), ("surface.splashsurf_260k", 64), ("surface.splashsurf_1m", 100)];
 /// Initial distance between particles (m).
 const SPACING: f64 = 0.1;
+/// Arguments of both. Splashsurf's lengths are in radii of particles, half a spacing, and its kernel reaches twice its smoothing length:
+/// 4 spacings as ours.
+const OTHERS: &str = "-r 0.05 -l 4.0 -c 1.0 -t 0.6 -n 1 -o other.ply -q";
+const OWN: &str = "vdb from-particles --spacing 0.1 --mesh own.ply --threads 1 -q";
 /// Runs of each, one after the other by turns.
 const RUNS: usize = 5;
 
@@ -31,42 +35,19 @@ pub fn run(h: &mut Harness) {
     }
     let folder = tempfile::tempdir().expect("a folder");
     for (name, edge) in GATES {
-        if !h.wants(name) {
-            continue;
-        }
-        let file = block(folder.path(), edge);
-        let time = |command: &mut Command| {
-            let start = Instant::now();
-            let status = command.current_dir(&folder).stdout(Stdio::null()).stderr(Stdio::null()).status();
-            assert!(status.expect("a program").success(), "{command:?}");
-            start.elapsed().as_secs_f64()
-        };
-        let (mut own, mut others) = (Vec::new(), Vec::new());
-        for _ in 0..RUNS {
-            others.push(time(splashsurf(&mut Command::new(&other), &file)));
-            own.push(time(frazil(&mut Command::new(env!("CARGO_BIN_EXE_frazil")), &file)));
-        }
-        let (own, others) = (median(own), median(others));
-        h.gate(
-            name,
-            own / others,
-            &format!("{own:.2} s, splashsurf {others:.2} s, of {} particles", edge.pow(3)),
-        );
+        h.measure(name, || {
+            let file = block(folder.path(), edge);
+            let time = |command: &mut Command| timed(|| works(command.current_dir(&folder))).0;
+            let (mut own, mut others) = (Vec::new(), Vec::new());
+            for _ in 0..RUNS {
+                others.push(time(Command::new(&other).arg("reconstruct").arg(&file).args(OTHERS.split(' '))));
+                own.push(time(frazil(OWN.split(' ')).arg(&file)));
+            }
+            let (own, others) = (median(own), median(others));
+            let note = format!("{own:.2} s, splashsurf {others:.2} s, of {} particles", edge.pow(3));
+            (own / others, note)
+        });
     }
-}
-
-/// Its lengths are in radii of particles, half a spacing, and its kernel reaches twice its smoothing length: 4 spacings as ours.
-fn splashsurf<'a>(command: &'a mut Command, file: &Path) -> &'a mut Command {
-    command
-        .arg("reconstruct")
-        .arg(file)
-        .args(["-r", "0.05", "-l", "4.0", "-c", "1.0", "-t", "0.6", "-n", "1"]);
-    command.args(["-o", "other.ply", "-q"])
-}
-
-fn frazil<'a>(command: &'a mut Command, file: &Path) -> &'a mut Command {
-    command.args(["vdb", "from-particles"]).arg(file);
-    command.args(["--spacing", "0.1", "--mesh", "own.ply", "--threads", "1", "-q"])
 }
 
 /// A block of particles with a wavy surface, as a file.

@@ -1,19 +1,21 @@
 //! Gates of a detailed mesh on a real solver's cache, through the command: `spot_drop` of the test data.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use frazil::Context;
+use frazil::geometry::check::topology::bodies;
 use frazil::geometry::mesh::attributes::{MeshArray, Number, On};
 use frazil::geometry::{DVec3, DetailedMesh, TriMesh, Uvs};
 use frazil::io::mesh;
-use frazil::surface::{Implicit, Isosurface, Params, Particles, Tracker};
+use frazil::surface::{Params, Particles, Tracker};
 
 use crate::common::character::output;
-use crate::common::liquids::context;
+use crate::common::liquids::{context, surface_on};
 use crate::common::nearest::distances;
 use crate::common::spot::{self, FPS, FRAMES, SPACING, particles_at};
 use crate::harness::{Harness, timed};
+use crate::process::{frazil, quiet, works};
 use crate::snow::grains::passes::kill;
 
 /// Frames whose particles' surface is triangulated on a quarter of the spacing.
@@ -45,7 +47,7 @@ pub fn run(h: &mut Harness) {
     let folder = tempfile::tempdir().expect("a folder");
     let spot = Spot { cache: first.with_file_name("spot.%04d.bgeo"), folder: folder.path().to_path_buf() };
     let own = spot.write_mesh(&first.with_file_name("spot_detail.ply"));
-    let (took, noisy) = timed(|| assert!(spot.pass("once", 2).status().expect("frazil").success()));
+    let (took, noisy) = timed(|| works(&mut spot.pass("once", 2)));
     println!("# {FRAMES} frames in {took:.1} s, with files{noisy}");
     if NAMES[..8].iter().any(|name| h.wants(name)) {
         let frames: Vec<DetailedMesh> = (1..=FRAMES).map(|frame| spot.frame("once", frame)).collect();
@@ -90,19 +92,12 @@ impl Spot {
 
     /// A pass into a folder of its own.
     fn pass(&self, out: &str, threads: usize) -> Command {
-        let mut run = Command::new(env!("CARGO_BIN_EXE_frazil"));
-        run.arg("surface").arg("-p").arg(&self.cache).arg("-m").arg(self.folder.join("spot.ply"));
-        run.args([
-            "-q",
-            "--fps",
-            &FPS.to_string(),
-            "--spacing",
-            &SPACING.to_string(),
-            "--set",
-            "surface.rebuild=false",
-        ]);
-        run.arg("-o").arg(self.folder.join(out)).args(["--threads", &threads.to_string()]);
-        run.stdout(Stdio::null()).stderr(Stdio::null());
+        let threads = threads.to_string();
+        let mut run = frazil(["surface", "-q", "--set", "surface.rebuild=false", "--threads", &threads]);
+        run.args(["--fps", &FPS.to_string(), "--spacing", &SPACING.to_string()]);
+        run.arg("-p").arg(&self.cache).arg("-m").arg(self.folder.join("spot.ply"));
+        run.arg("-o").arg(self.folder.join(out));
+        quiet(&mut run);
         run
     }
 
@@ -118,7 +113,7 @@ impl Spot {
     /// Whether the particles' own surface merges or splits between a frame and the one before.
     fn changes(&self, ctx: &Context, frame: i32) -> bool {
         let [before, now] = [frame - 1, frame].map(|frame| self.phi(ctx, frame, 0.5));
-        let kind = |surface: &TriMesh| (parts(surface), surface.euler_characteristic());
+        let kind = |surface: &TriMesh| (bodies(&surface.triangles).len(), surface.euler_characteristic());
         let [from, to] = [frame - 1, frame].map(|frame| self.particles(frame));
         let mut own = Tracker::new(ctx, Params::for_spacing(SPACING), &before, &from).expect("a tracker");
         let report = own.step(ctx, &from, &to, 1.0 / FPS).expect("a step");
@@ -127,9 +122,7 @@ impl Spot {
 
     /// The particles' own surface at a frame, on cells of some share of the spacing.
     fn phi(&self, ctx: &Context, frame: i32, cell: f64) -> TriMesh {
-        let phi =
-            Implicit::new(ctx, &self.particles(frame).positions, SPACING, cell * SPACING).expect("a surface");
-        Isosurface::new(&phi).mesh(&phi)
+        surface_on(ctx, &self.particles(frame).positions, SPACING, cell)
     }
 }
 
@@ -233,7 +226,7 @@ fn same_bytes(h: &mut Harness, spot: &Spot, took: f64) {
         let made = || std::fs::read_dir(spot.folder.join("killed/surface")).map_or(0, |files| files.count());
         let kills =
             kill(|threads| spot.pass("killed", threads), 0.25 * took, || Some(made()).filter(|n| *n > 0));
-        assert!(spot.pass("killed", 2).status().expect("frazil").success());
+        works(&mut spot.pass("killed", 2));
         let note = format!("after kills at frames {kills:?}; 1 and 2 threads");
         h.holds(NAMES[8], files("once") == files("killed") && kills.len() > 2, &note);
     }
@@ -242,37 +235,13 @@ fn same_bytes(h: &mut Harness, spot: &Spot, took: f64) {
         let all: Vec<_> = levels
             .iter()
             .map(|level| {
-                let mut run = spot.pass(level, 2);
-                run.env("FRAZIL_CPU", level).args(["--frames", "1-12"]);
-                assert!(run.status().expect("frazil").success());
+                works(spot.pass(level, 2).env("FRAZIL_CPU", level).args(["--frames", "1-12"]));
                 (1..=12).map(|frame| spot.frame(level, frame)).collect::<Vec<_>>()
             })
             .collect();
         let once: Vec<_> = (1..=12).map(|frame| spot.frame("once", frame)).collect();
         h.holds(NAMES[9], all.iter().all(|frames| *frames == once), "baseline and avx2, 12 frames");
     }
-}
-
-/// Count of connected parts.
-pub fn parts(mesh: &TriMesh) -> usize {
-    let mut parent: Vec<u32> = (0..mesh.positions.len() as u32).collect();
-    let root = |parent: &mut Vec<u32>, mut at: u32| {
-        while parent[at as usize] != at {
-            parent[at as usize] = parent[parent[at as usize] as usize];
-            at = parent[at as usize];
-        }
-        at
-    };
-    for [a, b, c] in &mesh.triangles {
-        for other in [b, c] {
-            let (from, to) = (root(&mut parent, *a), root(&mut parent, *other));
-            parent[from as usize] = to;
-        }
-    }
-    let mut roots: Vec<u32> = mesh.triangles.iter().map(|triangle| root(&mut parent, triangle[0])).collect();
-    roots.sort_unstable();
-    roots.dedup();
-    roots.len()
 }
 
 /// Vertices that share an edge with each.

@@ -10,20 +10,15 @@ use frazil::mesh_repair::{Source, Traced, carry_attributes};
 use frazil::surface::{Change, Rest};
 
 use crate::common::liquids::context;
-use crate::harness::Harness;
 use crate::surface::rebuilt_sequences::{Frame, Sequence, joined, walk};
 
-const NAME: &str = "surface.textures";
 /// How far apart in the texture the islands of a mesh with a seam lie (its size).
 const ISLAND: f32 = 8.0;
 /// Particles count as near a face up to so much farther away than the nearest one (spacings). Where those of both balls do, its texture
 /// may be either's.
 const NEAR: f64 = 0.5;
 
-pub fn run(h: &mut Harness) {
-    if !h.wants(NAME) {
-        return;
-    }
+pub fn measure() -> (f64, String) {
     let ctx = context(2);
     let sequence = joined(&ctx);
     let first = sequence.at(0);
@@ -68,7 +63,7 @@ pub fn run(h: &mut Harness) {
         most(|sheet| sheet.all.percent()),
         most(|sheet| sheet.of_before.percent())
     );
-    h.gate(NAME, worst, &note);
+    (worst, note)
 }
 
 /// By how much edges of faces differ, and how long they are, in the texture.

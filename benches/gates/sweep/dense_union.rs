@@ -8,6 +8,8 @@ use frazil::motion::Motion;
 use nalgebra::Rotation3;
 use rayon::prelude::*;
 
+use crate::common::nearest::closest;
+
 /// Directions that a depth is looked for in, at first and closely.
 const DIRECTIONS: usize = 256;
 const CLOSELY: usize = 16_384;
@@ -196,7 +198,7 @@ impl Shape {
         let near: Vec3 = p.cast();
         let mut least = best;
         self.tree.in_box(near - reach, near + reach, |index| {
-            least = least.min(triangle_distance(p, &self.corners[index]));
+            least = least.min((p - closest(p, self.corners[index])).norm());
         });
         least
     }
@@ -221,21 +223,6 @@ fn distinct(triangles: &[[u32; 3]]) -> Vec<([u32; 3], i32)> {
         }
     }
     layers.into_iter().filter(|(_, count)| *count != 0).collect()
-}
-
-fn triangle_distance(p: DVec3, [a, b, c]: &[DVec3; 3]) -> f64 {
-    let normal = (b - a).cross(&(c - a));
-    let edges = [(a, b), (b, c), (c, a)];
-    let over = edges.iter().all(|(s, t)| normal.dot(&(*t - *s).cross(&(p - *s))) >= 0.0);
-    if over && normal.norm() > 0.0 {
-        return (normal.dot(&(p - a)) / normal.norm()).abs();
-    }
-    let from_edge = |(s, t): (&DVec3, &DVec3)| {
-        let edge = t - s;
-        let part = ((p - s).dot(&edge) / edge.norm_squared().max(1e-30)).clamp(0.0, 1.0);
-        (p - s - edge * part).norm()
-    };
-    edges.into_iter().map(from_edge).fold(f64::INFINITY, f64::min)
 }
 
 /// Unit vectors spread evenly: a spiral.

@@ -15,9 +15,9 @@ const CELL: f64 = 0.005;
 /// All of them.
 pub fn run(h: &mut Harness) {
     wall(h);
-    cube(h);
+    h.measure_all(["snow.base.cube_missed", "snow.base.cube_fat"], cube);
     phi(h);
-    boots(h);
+    h.measure_all(["snow.base.boots_missed", "snow.base.boots_fat"], boots);
 }
 
 /// A box as a body that moves from time 0 to 1.
@@ -85,10 +85,7 @@ fn missed_and_fat(swept: &FloatGrid, reference: impl Fn(DVec3) -> f64) -> (u64, 
 }
 
 /// A cube of 12 triangles that turns about its diagonal.
-fn cube(h: &mut Harness) {
-    if !h.wants("snow.base.cube") {
-        return;
-    }
+fn cube() -> [(f64, &'static str); 2] {
     let ctx = context(2);
     // Turned so that the diagonal points along z, about which the angle then changes.
     let tilt = DVec3::new(std::f64::consts::FRAC_PI_4, -(1.0f64 / 3.0).sqrt().asin(), 0.0);
@@ -100,8 +97,7 @@ fn cube(h: &mut Harness) {
     let swept = sweep::chain(&ctx, &[moving_body(&motion)], 0.0, 1.0, &Settings::new(CELL)).expect("sweep");
     let poses = motion.poses(1024);
     let (missed, fat) = missed_and_fat(&swept, |p| motion.distance(&poses, p));
-    h.gate("snow.base.cube_missed", missed as f64, "");
-    h.gate("snow.base.cube_fat", fat as f64, "");
+    [(missed as f64, ""), (fat as f64, "")]
 }
 
 /// Distances in the band against exact ones, inside and outside: a box that does not turn, a ball that does.
@@ -145,13 +141,10 @@ fn phi(h: &mut Harness) {
 /// The four fastest frames of the demonstration's walk against the union of 256 poses. A pose's distance is
 /// sampled from OpenVDB's level set of the boot at rest, with cells a quarter as large: at the walk's own cells
 /// OpenVDB fills the grooves between the treads.
-fn boots(h: &mut Harness) {
-    if !h.wants("snow.base.boots") {
-        return;
-    }
+fn boots() -> [(f64, String); 2] {
     let ctx = context(2);
     let cell = scenes::WALK_CELL;
-    let boots = scenes::boots();
+    let boots = scenes::boots(DVec3::zeros());
     let mut speeds: Vec<(f64, usize, i32)> = Vec::new();
     for (boot, (mesh, keys)) in boots.iter().enumerate() {
         for frame in 2..=48 {
@@ -186,6 +179,5 @@ fn boots(h: &mut Harness) {
         }
     }
     let note = format!("{:.0} mm in a frame", speeds[0].0 * 1000.0);
-    h.gate("snow.base.boots_missed", missed as f64, &note);
-    h.gate("snow.base.boots_fat", fat as f64, &note);
+    [(missed as f64, note.clone()), (fat as f64, note)]
 }

@@ -198,12 +198,9 @@ impl frz_span {
             return Ok(None);
         }
         let packed = width * size_of::<T>();
-        if self.stride != 0 && self.stride != packed {
-            let stride = self.stride;
-            return Err(Failure::argument(format!(
-                "{name}: the stride of {stride} bytes is not {packed}, that of packed elements"
-            )));
-        }
+        refuse(self.stride != 0 && self.stride != packed, || {
+            format!("{name}: the stride of {} bytes is not {packed}, that of packed elements", self.stride)
+        })?;
         let first = self.data.cast::<T>();
         refuse(!first.is_aligned(), || {
             format!("{name}: the data are not aligned to {} bytes", align_of::<T>())
@@ -239,18 +236,17 @@ impl frz_span {
 
 /// Refuses a value that is not finite, naming it.
 pub(in crate::capi) fn finite(name: &str, value: f64) -> Outcome {
-    if value.is_finite() { Ok(()) } else { Err(Failure::argument(format!("{name} is not finite"))) }
+    refuse(!value.is_finite(), || format!("{name} is not finite"))
 }
 
 /// Refuses a number that is not finite, or outside its range.
 pub(in crate::capi) fn within(name: &str, value: f64, range: RangeInclusive<f64>, unit: &str) -> Outcome {
     finite(name, value)?;
-    if !range.contains(&value) {
+    refuse(!range.contains(&value), || {
         let (low, high) = range.into_inner();
         let (value, low, high) = (digits::given(value), digits::end(low), digits::end(high));
-        return Err(Failure::argument(format!("{name} = {value} is not within {low} to {high}{unit}")));
-    }
-    Ok(())
+        format!("{name} = {value} is not within {low} to {high}{unit}")
+    })
 }
 
 /// The numbers of an enum of the interface, and what they mean.
@@ -263,10 +259,8 @@ pub(in crate::capi) fn meaning<T: Copy>(
     number: u32,
     known: &[(u32, T)],
 ) -> Outcome<T> {
-    let found = known.iter().find(|(known, _)| *known == number);
-    found
-        .map(|(_, meaning)| *meaning)
-        .ok_or_else(|| Failure::argument(format!("{name} = {number} is not a value of {kind}")))
+    let found = known.iter().find(|(known, _)| *known == number).map(|(_, meaning)| *meaning);
+    found.ok_or_else(|| Failure::argument(format!("{name} = {number} is not a value of {kind}")))
 }
 
 /// A host's text; `None` for NULL.

@@ -1,7 +1,6 @@
 //! Repair: meshes with faults become solids.
 
 use super::triangles::{Mesh, frz_mesh};
-use crate::capi::ffi::fields::fields_of;
 use crate::capi::ffi::*;
 use crate::capi::runtime::context::{enter, frz_context};
 use crate::context::Context;

@@ -9,7 +9,7 @@ pub const FRZ_ABI_VERSION: u32 = 0x10008;
 /// Major version of frazil that this header belongs to.
 pub const FRZ_VERSION_MAJOR: u32 = 0;
 /// Minor version of frazil.
-pub const FRZ_VERSION_MINOR: u32 = 1;
+pub const FRZ_VERSION_MINOR: u32 = 2;
 /// Patch version of frazil.
 pub const FRZ_VERSION_PATCH: u32 = 0;
 

@@ -3,8 +3,8 @@
 use std::ffi::c_void;
 
 use super::spill::frz_shallow;
-use crate::capi::ffi::guard::frz_status;
 use crate::capi::ffi::saved::{restores, saves_in_place};
+use crate::capi::ffi::*;
 use crate::capi::runtime::context::frz_context;
 
 /// Saves all that the next frame depends on besides the ground, the parameters, the flow points and the bodies, in real time (frz_shallow):

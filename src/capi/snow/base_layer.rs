@@ -3,7 +3,6 @@
 use std::ffi::c_void;
 use std::ptr::NonNull;
 
-use crate::capi::ffi::fields::fields_of;
 use crate::capi::ffi::saved::write_bytes;
 use crate::capi::ffi::*;
 use crate::capi::grid::sparse::{Grid, frz_grid};

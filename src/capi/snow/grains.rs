@@ -4,7 +4,6 @@ use std::ffi::c_void;
 
 use super::base_layer::frz_base;
 use super::grains_params::{FRZ_GRAINS_FLOOR, frz_grains_params};
-use crate::capi::ffi::fields::fields_of;
 use crate::capi::ffi::saved::{Saved, resumed};
 use crate::capi::ffi::*;
 use crate::capi::grid::sparse::frz_grid;

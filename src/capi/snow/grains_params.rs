@@ -1,6 +1,5 @@
 //! Parameters of grains, in C.
 
-use crate::capi::ffi::fields::fields_of;
 use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::geometry::DVec3;
@@ -79,7 +78,7 @@ unsafe impl Sized32 for frz_grains_params {
     }
 }
 
-fields_of!(Params => frz_grains_params {
+fields_of!(Params <=> frz_grains_params {
     radius, compression, friction, attraction, restitution, air, gravity, seed
 });
 
@@ -110,21 +109,14 @@ impl frz_grains_params {
         within("sub_steps", f64::from(self.sub_steps), 0.0..=1000.0, "")?;
         within("reserved", f64::from(self.reserved), 0.0..=0.0, "")?;
         let params = Params {
-            radius: self.radius,
-            compression: self.compression,
-            friction: self.friction,
-            attraction: self.attraction,
-            restitution: self.restitution,
-            air: self.air,
             air_by_density: self.flags & FRZ_GRAINS_AIR_BY_DENSITY != 0,
-            gravity: self.gravity,
             lifetime: Some(self.lifetime).filter(|&lifetime| lifetime > 0.0),
             keep_box: has_box.then(|| [self.keep_low, self.keep_high].map(DVec3::from)),
             rests: self.flags & FRZ_GRAINS_RESTLESS == 0,
             active_distance: Some(self.active_distance).filter(|&distance| distance > 0.0),
             sub_steps: Some(self.sub_steps).filter(|&count| count > 0),
             most: self.max_grains as usize,
-            seed: self.seed,
+            ..self.over(Params::for_cell(0.01))
         };
         params.validate()?;
         Ok(params)

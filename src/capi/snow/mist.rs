@@ -5,7 +5,6 @@ use std::ffi::c_void;
 use super::base_layer::frz_base;
 use super::grains::frz_grains;
 use super::mist_params::frz_mist_params;
-use crate::capi::ffi::fields::fields_of;
 use crate::capi::ffi::saved::{Saved, resumed, saves};
 use crate::capi::ffi::*;
 use crate::capi::grid::sparse::{Grid, frz_grid};

@@ -1,6 +1,5 @@
 //! Parameters of mist, in C.
 
-use crate::capi::ffi::fields::fields_of;
 use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::snow::mist::Params;
@@ -57,7 +56,7 @@ unsafe impl Sized32 for frz_mist_params {
     }
 }
 
-fields_of!(Params => frz_mist_params {
+fields_of!(Params <=> frz_mist_params {
     cell, from_speed, gravity, half_life, wind, turbulence, turbulence_size, confinement, noise, noise_size, seed, padding
 });
 
@@ -70,22 +69,8 @@ impl frz_mist_params {
         no_flags(self.flags, FRZ_MIST_FALLING | FRZ_MIST_FLOOR)?;
         finite("cell", self.cell)?;
         within("floor", self.floor, -FARTHEST..=FARTHEST, " m")?;
-        let params = Params {
-            cell: self.cell,
-            from_speed: self.from_speed,
-            falling: self.flags & FRZ_MIST_FALLING != 0,
-            gravity: self.gravity,
-            half_life: self.half_life,
-            wind: self.wind,
-            turbulence: self.turbulence,
-            turbulence_size: self.turbulence_size,
-            confinement: self.confinement,
-            noise: self.noise,
-            noise_size: self.noise_size,
-            seed: self.seed,
-            padding: self.padding,
-            ..Params::for_cell(self.cell)
-        };
+        let params = self.over(Params::for_cell(self.cell));
+        let params = Params { falling: self.flags & FRZ_MIST_FALLING != 0, ..params };
         params.validate()?;
         Ok(params)
     }

@@ -1,5 +1,7 @@
 //! The current mesh of a tracker, and how the last step changed it.
 
+use std::borrow::Cow;
+
 use super::follower::{TrackerHandle, frz_tracker};
 use crate::capi::ffi::*;
 use crate::geometry::DVec3;
@@ -177,8 +179,21 @@ pub unsafe extern "C" fn frz_tracker_read_edits(
         let follower = read(tracker)?;
         match array {
             FRZ_EDIT_ORIGIN => dst.fill("dst", &follower.origins()),
-            FRZ_EDIT_SOURCE => dst.fill("dst", &follower.sources()),
-            FRZ_EDIT_KIND => dst.fill("dst", &follower.kinds()),
+            FRZ_EDIT_SOURCE => {
+                let source = |source: &Source| match *source {
+                    Source::Whole(triangle) | Source::Part(triangle) => i64::from(triangle),
+                    Source::New => -1,
+                };
+                dst.put("dst", follower.sources().iter().map(source))
+            }
+            FRZ_EDIT_KIND => {
+                let kind = |source: &Source| match source {
+                    Source::Whole(_) => FRZ_EDIT_WHOLE as u32,
+                    Source::Part(_) => FRZ_EDIT_PART as u32,
+                    Source::New => FRZ_EDIT_NEW as u32,
+                };
+                dst.put("dst", follower.sources().iter().map(kind))
+            }
             FRZ_EDIT_BEFORE => dst.put("dst", follower.before().iter().map(|&p| <[f64; 3]>::from(p))),
         }
     })
@@ -201,28 +216,11 @@ impl TrackerHandle {
         }
     }
 
-    /// For each triangle the one that it was, or is a part of; -1: neither.
-    fn sources(&self) -> Vec<i64> {
-        let source = |source: &Source| match source {
-            Source::Whole(triangle) | Source::Part(triangle) => i64::from(*triangle),
-            Source::New => -1,
-        };
+    /// The origin of each triangle.
+    fn sources(&self) -> Cow<'_, [Source]> {
         match &self.edits {
-            Some(edits) => edits.sources.iter().map(source).collect(),
-            None => (0..self.tracker.triangles().len() as i64).collect(),
-        }
-    }
-
-    /// For each triangle a [`frz_edit_kind`].
-    fn kinds(&self) -> Vec<u32> {
-        let kind = |source: &Source| match source {
-            Source::Whole(_) => FRZ_EDIT_WHOLE as u32,
-            Source::Part(_) => FRZ_EDIT_PART as u32,
-            Source::New => FRZ_EDIT_NEW as u32,
-        };
-        match &self.edits {
-            Some(edits) => edits.sources.iter().map(kind).collect(),
-            None => vec![FRZ_EDIT_WHOLE as u32; self.tracker.triangles().len()],
+            Some(edits) => Cow::from(&edits.sources),
+            None => (0..self.tracker.triangles().len() as u32).map(Source::Whole).collect(),
         }
     }
 }

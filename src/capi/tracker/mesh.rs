@@ -4,7 +4,6 @@ use std::ffi::c_void;
 
 use super::follower::{TrackerHandle, frz_tracker};
 pub use super::params::{frz_tracker_params, frz_tracker_params_init};
-use crate::capi::ffi::fields::fields_of;
 use crate::capi::ffi::saved::{Saved, resumed, saves};
 use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::{frz_mesh, no_flags};
@@ -246,7 +245,6 @@ pub unsafe extern "C" fn frz_tracker_ahead(
     guard(|| unsafe {
         let mut follower = change(tracker)?;
         let particles = self::particles(particles)?;
-        particles.validate()?;
         follower.tracker.set_ahead(std::sync::Arc::new(particles));
         Ok(())
     })

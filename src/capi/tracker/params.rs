@@ -1,6 +1,5 @@
 //! Parameters of a tracker, in C.
 
-use crate::capi::ffi::fields::fields_of;
 use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::surface::{Params, Weighting};
@@ -89,11 +88,12 @@ unsafe impl Sized32 for frz_tracker_params {
 
     fn defaults() -> Self {
         let (weighting, r#match) = (FRZ_TRACKER_AFFINE as u32, FRZ_TRACKER_MATCH_FLAGGED as u32);
-        Self { weighting, r#match, ..Params::for_spacing(0.0).into() }
+        let params = Params::for_spacing(0.0);
+        Self { weighting, r#match, rebuild: u32::from(params.rebuild), ..params.into() }
     }
 }
 
-fields_of!(Params => frz_tracker_params { spacing, cell, change, half_life, fade, rebuild, min_drop });
+fields_of!(Params <=> frz_tracker_params { spacing, cell, change, half_life, fade, min_drop });
 
 impl frz_tracker_params {
     /// The library's own parameters; an error names a field that is out of range.
@@ -108,17 +108,8 @@ impl frz_tracker_params {
         }
         let weighting = meaning("weighting", "frz_tracker_weighting", self.weighting, &WEIGHTINGS)?;
         let every = meaning("match", "frz_tracker_match", self.r#match, &MATCHES)?;
-        let params = Params {
-            spacing: self.spacing,
-            cell: self.cell,
-            change: self.change,
-            weighting,
-            half_life: self.half_life,
-            fade: self.fade,
-            rebuild: self.rebuild == 1,
-            every,
-            min_drop: self.min_drop as usize,
-        };
+        let params = self.over(Params::for_spacing(self.spacing));
+        let params = Params { weighting, rebuild: self.rebuild == 1, every, ..params };
         params.validate()?;
         Ok(params)
     }

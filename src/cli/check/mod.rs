@@ -55,6 +55,30 @@ impl Args {
     }
 }
 
+/// Refuses `--preview` for a scene that cannot be made coarser.
+fn refuse_preview(args: &Args, table: &str) -> Result<(), Failure> {
+    match args.preview {
+        Some(_) => Err(Failure::of_file(&args.scene, format!("--preview is for snow, not for [{table}]"))),
+        None => Ok(()),
+    }
+}
+
+/// The frames of a shot, and their time.
+fn frames_in_words([first, last]: [i32; 2], fps: f64) -> String {
+    let count = i64::from(last) - i64::from(first) + 1;
+    let seconds = count as f64 / fps;
+    format!("frames    {first}-{last}: {count}, {seconds:.2} s at {fps} a second\n")
+}
+
+/// What is free, if it is known.
+fn free_in_words(free: Option<u64>) -> String {
+    free.map_or(String::new(), |free| format!(" of {} free", size(free)))
+}
+
+fn warnings_in_words(warnings: &[String]) -> String {
+    warnings.iter().map(|warning| format!("warning   {warning}\n")).collect()
+}
+
 /// Warns if the files need more than is free; `how` says how sure that is.
 fn warn_of_space(warnings: &mut Vec<String>, how: &str, needed: Option<u64>, free: Option<u64>) {
     if let (Some(needed), Some(free)) = (needed, free)

@@ -5,16 +5,15 @@ use std::fmt::Write;
 use frazil::scene::Scene;
 use frazil::scene::shallow::{Inputs, Report, check};
 
-use super::{Args, print, size, warn_of_space};
+use super::{
+    Args, frames_in_words, free_in_words, print, refuse_preview, size, warn_of_space, warnings_in_words,
+};
 use crate::cli::session::Session;
 use crate::cli::session::exit::{Failure, Phase};
 
 /// Checks the scene.
 pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure> {
-    if args.preview.is_some() {
-        let what = format!("{}: --preview is for snow, not for [shallow]", args.scene.display());
-        return Err(Failure::refused(what));
-    }
+    refuse_preview(args, "shallow")?;
     let limit = session.max_memory();
     // The check converts the terrain to columns, too.
     session.ctx.set_memory_limit(limit);
@@ -29,11 +28,7 @@ pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure>
 }
 
 fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
-    let mut out = String::new();
-    let [first, last] = report.frames;
-    let count = i64::from(last) - i64::from(first) + 1;
-    let seconds = count as f64 / report.fps;
-    let _ = writeln!(out, "frames    {first}-{last}: {count}, {seconds:.2} s at {} a second", report.fps);
+    let mut out = frames_in_words(report.frames, report.fps);
     let [width, height, depth] = report.size_m;
     let of = report.triangles.map_or(String::new(), |count| format!(", {count} triangles"));
     let many = if report.files > 1 { format!(" and {} more", report.files - 1) } else { String::new() };
@@ -66,11 +61,8 @@ fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
         let _ = writeln!(out, "carries   {}", report.scalars.join(", "));
     }
     let _ = writeln!(out, "memory    about {} of {}", size(report.memory_bytes), size(limit));
-    let free = free.map_or(String::new(), |free| format!(" of {} free", size(free)));
+    let free = free_in_words(free);
     let each = size(report.frame_bytes);
     let _ = writeln!(out, "disk      at most {}{free}; {each} a frame", size(report.disk_bytes));
-    report.warnings.iter().for_each(|warning| {
-        let _ = writeln!(out, "warning   {warning}");
-    });
-    out
+    out + &warnings_in_words(&report.warnings)
 }

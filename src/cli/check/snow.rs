@@ -6,7 +6,7 @@ use frazil::scene::snow::MistForecast;
 use frazil::scene::snow::check::{ObjectReport, Report, check};
 use frazil::scene::{Inputs, Scene, System, check_memory};
 
-use super::{Args, print, size, surface, warn_of_space};
+use super::{Args, frames_in_words, free_in_words, print, size, surface, warn_of_space, warnings_in_words};
 use crate::cli::session::Session;
 use crate::cli::session::exit::{Failure, Phase};
 
@@ -38,11 +38,7 @@ pub fn run(args: &Args, session: &Session, mut scene: Scene) -> Result<(), Failu
 }
 
 fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
-    let mut out = String::new();
-    let [first, last] = report.frames;
-    let count = i64::from(last) - i64::from(first) + 1;
-    let seconds = count as f64 / report.fps;
-    let _ = writeln!(out, "frames    {first}-{last}: {count}, {seconds:.2} s at {} a second", report.fps);
+    let mut out = frames_in_words(report.frames, report.fps);
     let area = report.area_m.map_or(String::new(), |[x0, z0, x1, z1]| {
         let columns = [(x1 - x0) / report.cell_m, (z1 - z0) / report.cell_m].map(|cells| cells.round());
         format!("{:.2} x {:.2} m, {} x {} columns, ", x1 - x0, z1 - z0, columns[0], columns[1])
@@ -56,13 +52,9 @@ fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
     let mist = if report.mist.is_some() { ", without mist" } else { "" };
     let _ = writeln!(out, "memory    about {} of {}{mist}", size(report.memory_bytes), size(limit));
     if let Some(disk) = report.disk_bytes {
-        let free = free.map_or(String::new(), |free| format!(" of {} free", size(free)));
-        let _ = writeln!(out, "disk      about {}{free}{mist}", size(disk));
+        let _ = writeln!(out, "disk      about {}{}{mist}", size(disk), free_in_words(free));
     }
-    report.warnings.iter().for_each(|warning| {
-        let _ = writeln!(out, "warning   {warning}");
-    });
-    out
+    out + &warnings_in_words(&report.warnings)
 }
 
 fn describe_grains(out: &mut String, report: &Report) {

@@ -5,16 +5,15 @@ use std::fmt::Write;
 use frazil::scene::Scene;
 use frazil::scene::surface::{Inputs, Report, check};
 
-use super::{Args, print, size, warn_of_space};
+use super::{
+    Args, frames_in_words, free_in_words, print, refuse_preview, size, warn_of_space, warnings_in_words,
+};
 use crate::cli::session::Session;
 use crate::cli::session::exit::{Failure, Phase};
 
 /// Checks the scene.
 pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure> {
-    if args.preview.is_some() {
-        let what = format!("{}: --preview is for snow, not for [surface]", args.scene.display());
-        return Err(Failure::refused(what));
-    }
+    refuse_preview(args, "surface")?;
     // A mesh may have to be repaired.
     session.ctx.set_memory_limit(session.max_memory());
     let inputs = Inputs::load(&session.ctx, scene).before()?;
@@ -32,11 +31,7 @@ pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure>
 }
 
 fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
-    let mut out = String::new();
-    let [first, last] = report.frames;
-    let count = i64::from(last) - i64::from(first) + 1;
-    let seconds = count as f64 / report.fps;
-    let _ = writeln!(out, "frames    {first}-{last}: {count}, {seconds:.2} s at {} a second", report.fps);
+    let mut out = frames_in_words(report.frames, report.fps);
     let [least, most] = report.particles;
     let counts = if least == most { least.to_string() } else { format!("{least} to {most}") };
     let motion = match (report.has_ids, report.has_velocities) {
@@ -59,12 +54,9 @@ fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
         report.vertices, report.triangles, report.edge_m
     );
     let _ = writeln!(out, "          {width:.3} x {height:.3} x {depth:.3} m (x, y, z) at the first frame");
-    let free = free.map_or(String::new(), |free| format!(" of {} free", size(free)));
+    let free = free_in_words(free);
     let _ = writeln!(out, "memory    about {} of {}", size(report.memory_bytes), size(limit));
     let each = size(report.frame_bytes);
     let _ = writeln!(out, "disk      about {}{free}; {each} a frame", size(report.disk_bytes));
-    report.warnings.iter().for_each(|warning| {
-        let _ = writeln!(out, "warning   {warning}");
-    });
-    out
+    out + &warnings_in_words(&report.warnings)
 }

@@ -12,7 +12,7 @@ use frazil::{Context, Error, io};
 use serde_json::{Map, Value, json};
 
 use super::compared::Model;
-use crate::cli::options::Origin;
+use crate::cli::options::{Origin, of_frame};
 use crate::cli::output;
 use crate::cli::session::Session;
 use crate::cli::session::exit::{Failure, Phase};
@@ -79,8 +79,7 @@ impl Args {
         let frames: Vec<i32> = match (sequence, &self.frames) {
             (Some(_), Some(frames)) => frames.iter().collect(),
             (Some(path), None) => {
-                let path = path.display();
-                return refused(&format!("{path}: is of many frames: choose them with --frames A-B"));
+                return Err(Failure::of_file(path, "is of many frames: choose them with --frames A-B"));
             }
             (None, Some(_)) => {
                 return refused("--frames is for sequences such as a.%04d.ply, and none is given");
@@ -182,11 +181,6 @@ impl Args {
     fn say(&self, text: &str) -> Result<(), Failure> {
         if self.json { Ok(()) } else { output::print(text).during() }
     }
-}
-
-/// The file of a frame, from one file or a sequence.
-fn of_frame(path: &Path, frame: i32) -> PathBuf {
-    Pattern::parse(path).map_or_else(|| path.to_path_buf(), |pattern| pattern.path(frame))
 }
 
 /// Distances between the surfaces of two meshes, both ways.

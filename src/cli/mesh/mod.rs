@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use clap::Subcommand;
 use frazil::geometry::check::faults::Faults;
 use frazil::geometry::check::predicates::is_flat;
-use frazil::geometry::check::topology::Topology;
+use frazil::geometry::check::topology::{self, Topology};
 use frazil::geometry::mesh::weld::Weld;
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Character, is_gltf};
@@ -180,22 +180,8 @@ fn bodies(mesh: &TriMesh) -> Vec<TriMesh> {
     let joined = mesh.triangles.iter().map(|corners| corners.map(|vertex| same[vertex as usize]));
     let place = |vertex: u32| mesh.positions[vertex as usize];
     let triangles: Vec<[u32; 3]> = joined.filter(|corners| !is_flat(&corners.map(place))).collect();
-    let sides = |(&[a, b, c], triangle): (&[u32; 3], u32)| {
-        [[a, b], [b, c], [c, a]].map(|[i, j]| ([i.min(j), i.max(j)], triangle))
-    };
-    let mut edges: Vec<([u32; 2], u32)> = triangles.iter().zip(0..).flat_map(sides).collect();
-    edges.sort_unstable();
-    // Union-find: each triangle points to an earlier one of its body, the first to itself.
-    let mut before: Vec<u32> = (0..triangles.len() as u32).collect();
-    for pair in edges.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
-        let [a, b] = [pair[0].1, pair[1].1].map(|triangle| first(&mut before, triangle));
-        before[a.max(b) as usize] = a.min(b);
-    }
-    let mut order: Vec<(u32, usize)> =
-        (0..triangles.len()).map(|triangle| (first(&mut before, triangle as u32), triangle)).collect();
-    order.sort_unstable();
-    let alone = |body: &[(u32, usize)]| {
-        let corners: Vec<[u32; 3]> = body.iter().map(|(_, triangle)| triangles[*triangle]).collect();
+    let alone = |body: Vec<u32>| {
+        let corners: Vec<[u32; 3]> = body.iter().map(|triangle| triangles[*triangle as usize]).collect();
         let mut vertices = corners.as_flattened().to_vec();
         vertices.sort_unstable();
         vertices.dedup();
@@ -205,116 +191,85 @@ fn bodies(mesh: &TriMesh) -> Vec<TriMesh> {
             triangles: corners.iter().map(|corners| corners.map(number)).collect(),
         }
     };
-    order.chunk_by(|a, b| a.0 == b.0).map(alone).collect()
-}
-
-/// The first triangle of a body.
-fn first(before: &mut [u32], mut triangle: u32) -> u32 {
-    while before[triangle as usize] != triangle {
-        let further = before[before[triangle as usize] as usize];
-        before[triangle as usize] = further;
-        triangle = further;
-    }
-    triangle
+    topology::bodies(&triangles).into_iter().map(alone).collect()
 }
 
 /// A key of the report, and the noun for its count, singular and plural.
-pub type Counted = (&'static str, [&'static str; 2]);
+pub type Counted = (&'static str, &'static str, &'static str);
 
 const PARTS: [Counted; 2] = [
-    ("holes", ["hole: closed by a cone to its centre", "holes: closed by cones to their centres"]),
+    ("holes", "hole: closed by a cone to its centre", "holes: closed by cones to their centres"),
     (
         "inverted_parts",
-        [
-            "part is inside out: it is turned outward where the mesh is used",
-            "parts are inside out: they are turned outward where the mesh is used",
-        ],
+        "part is inside out: it is turned outward where the mesh is used",
+        "parts are inside out: they are turned outward where the mesh is used",
     ),
 ];
 
 /// Faulty edges and vertices, joined by position or by index.
 const JOINTS: [Counted; 4] = [
-    ("open_edges", ["edge with one triangle", "edges with one triangle"]),
+    ("open_edges", "edge with one triangle", "edges with one triangle"),
     (
         "crowded_edges",
-        [
-            "non-manifold edge: it has more than two triangles",
-            "non-manifold edges: they have more than two triangles",
-        ],
+        "non-manifold edge: it has more than two triangles",
+        "non-manifold edges: they have more than two triangles",
     ),
     (
         "turned_edges",
-        [
-            "inconsistently oriented edge: its triangles disagree about which side is out",
-            "inconsistently oriented edges: their triangles disagree about which side is out",
-        ],
+        "inconsistently oriented edge: its triangles disagree about which side is out",
+        "inconsistently oriented edges: their triangles disagree about which side is out",
     ),
     (
         "non_manifold_vertices",
-        [
-            "non-manifold vertex: its triangles form no single fan",
-            "non-manifold vertices: their triangles form no single fan",
-        ],
+        "non-manifold vertex: its triangles form no single fan",
+        "non-manifold vertices: their triangles form no single fan",
     ),
 ];
 
 const TRIANGLES: [Counted; 11] = [
     (
         "crossings",
-        [
-            "pair of triangles cuts each other: harmless only where both are right side out",
-            "pairs of triangles cut each other: harmless only where both are right side out",
-        ],
+        "pair of triangles cuts each other: harmless only where both are right side out",
+        "pairs of triangles cut each other: harmless only where both are right side out",
     ),
     (
         "corner_crossings",
-        [
-            "pair of triangles with a common corner cuts each other: harmless only where both are right side out",
-            "pairs of triangles with a common corner cut each other: harmless only where both are right side out",
-        ],
+        "pair of triangles with a common corner cuts each other: harmless only where both are right side out",
+        "pairs of triangles with a common corner cut each other: harmless only where both are right side out",
     ),
     (
         "folds",
-        [
-            "pair of triangles is folded onto each other along its common edge",
-            "pairs of triangles are folded onto each other along their common edges",
-        ],
+        "pair of triangles is folded onto each other along its common edge",
+        "pairs of triangles are folded onto each other along their common edges",
     ),
     (
         "overlaps",
-        [
-            "pair of triangles lies on each other in one plane",
-            "pairs of triangles lie on each other in one plane",
-        ],
+        "pair of triangles lies on each other in one plane",
+        "pairs of triangles lie on each other in one plane",
     ),
     (
         "touches",
-        ["pair of triangles touches beyond common corners", "pairs of triangles touch beyond common corners"],
+        "pair of triangles touches beyond common corners",
+        "pairs of triangles touch beyond common corners",
     ),
-    ("degenerate_triangles", ["triangle without area: ignored", "triangles without area: ignored"]),
-    ("doubled_triangles", ["triangle with the corners of another", "triangles with the corners of another"]),
+    ("degenerate_triangles", "triangle without area: ignored", "triangles without area: ignored"),
+    ("doubled_triangles", "triangle with the corners of another", "triangles with the corners of another"),
     (
         "doubled_vertices",
-        ["vertex at the position of another: joined", "vertices at the position of another: joined"],
+        "vertex at the position of another: joined",
+        "vertices at the position of another: joined",
     ),
     (
         "near_vertices",
-        [
-            "vertex on an open edge within rounding of another: joined",
-            "vertices on open edges within rounding of others: joined",
-        ],
+        "vertex on an open edge within rounding of another: joined",
+        "vertices on open edges within rounding of others: joined",
     ),
     (
         "ambiguous_vertices",
-        [
-            "vertex on an open edge within rounding of others: which of them it is is not clear",
-            "vertices on open edges within rounding of others: which of them are one is not clear",
-        ],
+        "vertex on an open edge within rounding of others: which of them it is is not clear",
+        "vertices on open edges within rounding of others: which of them are one is not clear",
     ),
-    (
-        "unused_vertices",
-        ["vertex that no triangle names: ignored", "vertices that no triangle names: ignored"],
-    ),
+    ("unused_vertices", "vertex that no triangle names: ignored", "vertices that no triangle names: ignored"),
 ];
 
 /// A mesh as text: what it is, then only the faults that it has.
@@ -351,12 +306,17 @@ fn in_words(mesh: &Value) -> String {
     let volume = if is_rounding { 0.0 } else { volume };
     out += &format!("area {area:.6} m2, volume {volume:.6} m3\n");
     out += &bodies_in_words(mesh["bodies"].as_array().map_or(&[][..], Vec::as_slice));
-    for (key, forms) in PARTS.into_iter().chain(JOINTS).chain(TRIANGLES).filter(|(key, _)| count(key) > 0) {
-        out += &format!("  {:>8} {}\n", count(key), form(count(key), forms));
+    for (key, one, several) in [&PARTS[..], &JOINTS, &TRIANGLES].concat() {
+        if count(key) > 0 {
+            out += &line(count(key), [one, several]);
+        }
     }
     // Faults hidden by joining vertices by position.
-    for (key, forms) in JOINTS.into_iter().filter(|(key, _)| ![0, count(key)].contains(&as_it_is(key))) {
-        out += &format!("  {:>8} {}, by the vertices' indices\n", as_it_is(key), form(as_it_is(key), forms));
+    for (key, one, several) in
+        JOINTS.into_iter().filter(|(key, ..)| ![0, count(key)].contains(&as_it_is(key)))
+    {
+        let (count, noun) = (as_it_is(key), form(as_it_is(key), [one, several]));
+        out += &format!("  {count:>8} {noun}, by the vertices' indices\n");
     }
     if volume < 0.0 {
         out += "           inside out: turned outward where it is used\n";
@@ -387,6 +347,11 @@ fn bodies_in_words(bodies: &[Value]) -> String {
         out += &format!("  and {others} more {}\n", form(others as u64, ["body", "bodies"]));
     }
     out
+}
+
+/// A line with a count and its noun.
+pub fn line(count: u64, forms: [&'static str; 2]) -> String {
+    format!("  {count:>8} {}\n", form(count, forms))
 }
 
 /// The noun for a count, singular or plural.

@@ -2,22 +2,21 @@
 
 use std::path::{Path, PathBuf};
 
-use frazil::geometry::mesh::attributes::On;
-use frazil::geometry::{DVec3, DetailedMesh, MeshArray, TriMesh};
+use frazil::geometry::{DVec3, DetailedMesh, TriMesh};
 use frazil::io;
-use frazil::io::files::atomic;
 use frazil::io::files::sequence::Pattern;
-use frazil::io::mesh::extension;
 use frazil::io::usd;
 use frazil::mesh_repair::{Prepared, Repaired, carry_attributes, repair};
 use frazil::motion::{Character, is_gltf};
-use frazil::scene::{FrameChoice, Frames};
+use frazil::scene::FrameChoice;
 use frazil::{Error, Result};
 use serde_json::{Value, json};
 
-use super::{Counted, form};
-use crate::cli::convert::{Losses, VELOCITY, check_output, prim_name, vectors};
-use crate::cli::options::{MeshSpace, positive, warn_if_far};
+use super::{Counted, form, line};
+use crate::cli::convert::{Losses, MeshFile, VELOCITY, check_output, prim_name};
+use crate::cli::options::{
+    MeshSpace, needs_frames, of_frame, one_frame, positive, refuse_one_file, warn_if_far,
+};
 use crate::cli::output;
 use crate::cli::session::Session;
 use crate::cli::session::exit::{Failure, Phase};
@@ -113,11 +112,6 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
     output::print(&format!("{all:#}\n")).during()
 }
 
-/// The file of a frame, from one file or a sequence.
-fn of_frame(path: &Path, frame: i32) -> PathBuf {
-    Pattern::parse(path).map_or_else(|| path.to_path_buf(), |pattern| pattern.path(frame))
-}
-
 /// The error for a mesh that encloses nothing.
 const NOTHING: &str = "nothing in the mesh encloses a volume";
 
@@ -128,10 +122,7 @@ fn repaired(session: &Session, path: &Path, mesh: &TriMesh, cell: f64) -> Result
     }
     #[cfg(feature = "vdb")]
     session.ctx.set_memory_limit(session.max_memory());
-    repair(&session.ctx, mesh, cell).map_err(|error| match error {
-        Error::Argument(what) => Error::file(path, what),
-        other => other,
-    })
+    repair(&session.ctx, mesh, cell).map_err(|error| error.in_file(path))
 }
 
 /// Warnings about a repair: what is lost, and ambiguous corners.
@@ -202,15 +193,13 @@ impl Cell {
 
 impl Args {
     fn frames(&self) -> std::result::Result<FrameChoice, Failure> {
-        let refused = |path: &Path, what: &str| Err(Failure::refused(format!("{}: {what}", path.display())));
         match (Pattern::parse(&self.input), &self.frames) {
-            (Some(_), None) => refused(&self.input, "a sequence needs --frames A-B"),
-            (Some(_), Some(frames)) if frames.count() > 1 && Pattern::parse(&self.output).is_none() => {
-                refused(&self.output, "several frames need a pattern such as solid.%04d.ply")
+            (Some(_), None) => Err(needs_frames(&self.input)),
+            (Some(_), Some(frames)) => {
+                refuse_one_file(&self.output, frames, "solid.%04d.ply").map(|()| frames.clone())
             }
-            (Some(_), Some(frames)) => Ok(frames.clone()),
             (None, Some(_)) => Err(Failure::refused("--frames is of no use with one mesh")),
-            (None, None) => Ok(FrameChoice::from(Frames { first: 1, last: 1 })),
+            (None, None) => Ok(one_frame()),
         }
     }
 
@@ -242,28 +231,9 @@ impl Args {
 
     fn write(&self, path: &Path, frame: i32, detail: &DetailedMesh) -> Result<()> {
         let DetailedMesh { mesh, uvs, arrays } = detail;
-        if extension(path) != "usda" {
-            let arrays: Vec<&MeshArray> = arrays.iter().collect();
-            let carried = io::mesh::Carried { uvs: uvs.as_ref(), arrays: &arrays, ..Default::default() };
-            return io::mesh::write_carried(path, mesh, &carried);
-        }
-        // USD has its own velocities.
-        let velocities = vectors(arrays, VELOCITY).unwrap_or_default();
-        let is_other = |array: &&MeshArray| {
-            velocities.is_empty() || array.on != On::Vertices || !VELOCITY.contains(&&*array.name)
-        };
-        let others: Vec<&MeshArray> = arrays.iter().filter(is_other).collect();
-        let name = prim_name(&self.input);
-        let mesh = usd::MeshFrame {
-            name: &name,
-            points: &mesh.positions,
-            velocities: &velocities,
-            triangles: &mesh.triangles,
-            uvs: uvs.as_ref(),
-            arrays: &others,
-        };
-        let text = usd::clip("meshes", frame, self.fps, usd::Units::OWN, &[mesh]);
-        atomic::write_bytes(path, text.as_bytes())
+        let (name, units) = (prim_name(&self.input), usd::Units::OWN);
+        let file = MeshFile { path, name: &name, frame, fps: self.fps, units };
+        file.write(mesh, uvs.as_ref(), arrays, |own| Ok(own.unwrap_or_default()))
     }
 }
 
@@ -304,24 +274,21 @@ fn report(mesh: &TriMesh, repaired: &Repaired, cell: Cell) -> Value {
 const DONE: [Counted; 5] = [
     (
         "joined_vertices",
-        [
-            "vertex joined with another that is the same corner",
-            "vertices joined with others that are the same corners",
-        ],
+        "vertex joined with another that is the same corner",
+        "vertices joined with others that are the same corners",
     ),
     (
         "dropped_triangles",
-        [
-            "triangle left out: without area, doubled, or alone",
-            "triangles left out: without area, doubled, or alone",
-        ],
+        "triangle left out: without area, doubled, or alone",
+        "triangles left out: without area, doubled, or alone",
     ),
     (
         "turned_triangles",
-        ["triangle turned round as its neighbours are", "triangles turned round as their neighbours are"],
+        "triangle turned round as its neighbours are",
+        "triangles turned round as their neighbours are",
     ),
-    ("turned_parts", ["part turned outward", "parts turned outward"]),
-    ("closed_holes", ["hole closed", "holes closed"]),
+    ("turned_parts", "part turned outward", "parts turned outward"),
+    ("closed_holes", "hole closed", "holes closed"),
 ];
 
 /// How far rebuilding extended beyond the faulty cells and those that they require.
@@ -342,8 +309,8 @@ fn in_words(report: &Value, cell: Cell) -> String {
     }
     let what = if report["lost"] == json!(true) { "a solid now, but not all of it" } else { "a solid now" };
     let mut out = format!("{file}: {what}, in {output}\n");
-    for (key, forms) in DONE.into_iter().filter(|(key, _)| count(key) > 0) {
-        out += &format!("  {:>8} {}\n", count(key), form(count(key), forms));
+    for (key, one, several) in DONE.into_iter().filter(|(key, ..)| count(key) > 0) {
+        out += &line(count(key), [one, several]);
     }
     let (used, Cell { edge, why }) = (number("cell_m"), cell);
     let why = if used < edge { format!(": {edge} m would have left nothing") } else { why.to_string() };
@@ -357,8 +324,7 @@ fn in_words(report: &Value, cell: Cell) -> String {
     let (kept, before, made) = (count("kept_triangles"), count("triangles_before"), count("made_triangles"));
     out += &format!("  {kept:>8} of {before} triangles kept, {made} made\n");
     if count("slivers") > 0 {
-        let forms = ["of these is a sliver", "of these are slivers"];
-        out += &format!("  {:>8} {}\n", count("slivers"), form(count("slivers"), forms));
+        out += &line(count("slivers"), ["of these is a sliver", "of these are slivers"]);
     }
     let (volume, after) = (number("volume_before_m3"), number("volume_m3"));
     out + &format!("  volume {volume:.6} m3 before, {after:.6} m3 now\n")

@@ -1,6 +1,8 @@
 //! How the inputs are drawn, and from which camera.
 
-use frazil::geometry::DVec3;
+use std::path::Path;
+
+use frazil::geometry::{DVec3, DetailedMesh};
 use frazil::render::{Camera, Cloud, Cut, Light, Model, Models, Picture, Plane, Size};
 #[cfg(feature = "vdb")]
 use frazil::render::{Field, SNOW};
@@ -8,8 +10,8 @@ use frazil::render::{Field, SNOW};
 use frazil::vdb::level_set;
 use frazil::{Context, Error, Result};
 
-use super::tint::Tint;
-use crate::cli::preview::parts::{Part, Wet};
+use super::tint::{Tint, Tinted};
+use crate::cli::preview::parts::Part;
 use crate::cli::session::exit::Failure;
 
 /// The colour of meshes (linear red, green, blue): leather, to contrast with snow.
@@ -84,40 +86,23 @@ impl Look {
             match part {
                 Part::Mesh(detailed) => {
                     let model = Model::mesh(&detailed.mesh, BROWN);
-                    let numbers = self.color.as_deref().and_then(|name| detailed.of_vertices(name));
+                    let numbers = self.numbers(&detailed);
                     has_colors |= numbers.is_some();
-                    models.push(match numbers {
-                        Some(numbers) => model.coloured(&numbers),
-                        None => model,
-                    });
+                    models.push(if let Some(numbers) = numbers { model.coloured(&numbers) } else { model });
                 }
                 Part::Liquid(detailed, wet) => {
-                    let mesh = &detailed.mesh;
-                    let numbers = self.color.as_deref().and_then(|name| detailed.of_vertices(name));
+                    let (numbers, tinted) =
+                        (self.numbers(&detailed), self.tint.as_ref().and_then(|tint| tint.of(&detailed)));
                     has_colors |= numbers.is_some();
-                    // Without opacities the liquid hides the ground.
-                    let alpha =
-                        detailed.of_vertices("alpha").unwrap_or_else(|| vec![1.0; mesh.positions.len()]);
-                    let alpha = alpha.iter().map(|opacity| *opacity as f32).collect();
-                    let tinted = self.tint.as_ref().and_then(|tint| tint.of(&detailed));
                     has_tint |= tinted.is_some();
-                    models.push(match (numbers, tinted) {
-                        (Some(numbers), _) => Model::mesh(mesh, wet.colour()).coloured(&numbers),
-                        (None, Some((colours, alpha))) => {
-                            Model::liquid(mesh, wet.colour(), alpha).painted(colours)
-                        }
-                        (None, None) => Model::liquid(mesh, wet.colour(), alpha),
-                    });
+                    models.push(liquid(&detailed, wet.colour, numbers, tinted));
                 }
                 Part::Ground(mesh, stains, wet) => {
                     let model = Model::mesh(&mesh, STONE);
-                    let stained = stains.len() == mesh.positions.len();
-                    let stain = |share: &f64| mix(STONE, wet.colour(), STAINED * share.clamp(0.0, 1.0));
-                    models.push(if stained {
-                        model.painted(stains.iter().map(stain).collect())
-                    } else {
-                        model
-                    });
+                    let stain = |share: &f64| mix(STONE, wet.colour, STAINED * share.clamp(0.0, 1.0));
+                    let is_stained = stains.len() == mesh.positions.len();
+                    let painted = is_stained.then(|| stains.iter().map(stain).collect());
+                    models.push(if let Some(painted) = painted { model.painted(painted) } else { model });
                 }
                 Part::Obstacle(mesh) => models.push(Model::mesh(&mesh, STEEL)),
                 Part::Cloth(mesh) => models.push(Model::mesh(&mesh, LINEN)),
@@ -130,15 +115,10 @@ impl Look {
                 #[cfg(feature = "vdb")]
                 Part::Fog(path, grid) => {
                     let fog = frazil::render::Fog::grid(ctx, &grid, self.fog_density);
-                    let fog = fog.map_err(|error| match error {
-                        Error::Argument(what) => Error::file(&path, what),
-                        other => other,
-                    })?;
+                    let fog = fog.map_err(|error| error.in_file(&path))?;
                     if fog.is_empty() {
-                        let name = grid.name();
-                        let what = format!("{}: grid \"{name}\" has no density above 0", path.display());
-                        log::info!("{what}");
-                        hollow = Some(what);
+                        let what = format!("grid \"{}\" has no density above 0", grid.name());
+                        hollow = Some(invisible(&path, &what));
                     }
                     fogs.push(fog);
                 }
@@ -147,6 +127,11 @@ impl Look {
         has_colors |= !clouds.is_empty();
         let models = Models::new(models).with_clouds(clouds).with_fogs(fogs);
         Ok(Drawing { content: Content::Models(models), has_colors, has_tint, hollow })
+    }
+
+    /// The numbers of the vertices that `--color` chooses.
+    fn numbers(&self, detailed: &DetailedMesh) -> Option<Vec<f64>> {
+        detailed.of_vertices(self.color.as_deref()?)
     }
 
     /// The chosen camera and light, or ones that show all drawings in full.
@@ -197,11 +182,7 @@ fn cut(ctx: &Context, parts: Vec<Part>, plane: Plane) -> Result<Drawing> {
             Part::Ground(mesh, ..) | Part::Obstacle(mesh) | Part::Cloth(mesh) => {
                 cut = cut.with_surface(&mesh, INK)
             }
-            Part::Points(path, _) => {
-                let what = format!("{}: points are left out of a cut", path.display());
-                log::info!("{what}");
-                hollow = Some(what);
-            }
+            Part::Points(path, _) => hollow = Some(invisible(&path, "points are left out of a cut")),
             #[cfg(feature = "vdb")]
             Part::Surface(grid) => {
                 let surface = level_set::to_mesh(ctx, &grid, 0.0, 0.0)?;
@@ -217,47 +198,34 @@ fn cut(ctx: &Context, parts: Vec<Part>, plane: Plane) -> Result<Drawing> {
     Ok(Drawing { content: Content::Cut(cut), has_colors: false, has_tint: false, hollow })
 }
 
+/// The surface of a liquid, coloured by numbers or tinted, if they are given; without opacities it hides the ground.
+fn liquid(
+    detailed: &DetailedMesh,
+    colour: [f32; 3],
+    numbers: Option<Vec<f64>>,
+    tinted: Option<Tinted>,
+) -> Model {
+    let mesh = &detailed.mesh;
+    if let Some(numbers) = numbers {
+        return Model::mesh(mesh, colour).coloured(&numbers);
+    }
+    if let Some((colours, alpha)) = tinted {
+        return Model::liquid(mesh, colour, alpha).painted(colours);
+    }
+    let alpha = detailed.of_vertices("alpha").unwrap_or_else(|| vec![1.0; mesh.positions.len()]);
+    Model::liquid(mesh, colour, alpha.iter().map(|opacity| *opacity as f32).collect())
+}
+
+/// Logs and gives the reason why a part of a file is not seen.
+fn invisible(path: &Path, what: &str) -> String {
+    let what = format!("{}: {what}", path.display());
+    log::info!("{what}");
+    what
+}
+
 /// Interpolates two colours.
 fn mix(from: [f32; 3], to: [f32; 3], share: f64) -> [f32; 3] {
     [0, 1, 2].map(|n| from[n] + share as f32 * (to[n] - from[n]))
-}
-
-impl Wet {
-    /// Its colour (linear red, green, blue).
-    pub fn colour(self) -> [f32; 3] {
-        match self {
-            Self::Water => [0.02, 0.16, 0.20],
-            Self::Blood => [0.30, 0.008, 0.006],
-            Self::Paint => [0.05, 0.20, 0.60],
-            Self::Honey => [0.70, 0.32, 0.02],
-            Self::Milk => [0.86, 0.84, 0.78],
-            Self::Coffee => [0.045, 0.013, 0.004],
-        }
-    }
-
-    /// The depth that absorbs 63 % of the light (m).
-    pub fn depth(self) -> f64 {
-        match self {
-            Self::Water => 0.05,
-            Self::Blood => 0.0004,
-            Self::Paint => 0.0002,
-            Self::Honey => 0.012,
-            Self::Milk => 0.0004,
-            Self::Coffee => 0.0012,
-        }
-    }
-
-    /// Its name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Water => "water",
-            Self::Blood => "blood",
-            Self::Paint => "paint",
-            Self::Honey => "honey",
-            Self::Milk => "milk",
-            Self::Coffee => "coffee",
-        }
-    }
 }
 
 impl Content {

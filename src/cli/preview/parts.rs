@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use frazil::geometry::{DetailedMesh, Points, TriMesh};
 #[cfg(feature = "vdb")]
 use frazil::vdb::FloatGrid;
-use frazil::{Error, Result, io};
+use frazil::{Context, Error, Result, io};
 
 #[cfg(feature = "vdb")]
 use crate::cli::vdb::model::{self, Content};
@@ -32,27 +32,71 @@ pub enum Part {
     Fog(PathBuf, FloatGrid),
 }
 
+/// The output folder of a shot, read frame by frame.
+pub trait Folder: Send {
+    /// Its path.
+    fn path(&self) -> &Path;
+
+    /// The frames that all of its stages have, ascending; at least one.
+    fn frames(&self) -> &[i32];
+
+    /// The names of its stages.
+    fn stages(&self) -> Vec<&str>;
+
+    /// Its frame rate, from its scene.
+    ///
+    /// # Errors
+    /// A scene that cannot be read.
+    fn fps(&self) -> Result<f64>;
+
+    /// Reads the contents of a frame; in ascending order, each frame reads one file of each stage.
+    ///
+    /// # Errors
+    /// A file that cannot be read or that is not what was written; cancel.
+    fn read(&mut self, ctx: &Context, frame: i32) -> Result<Vec<Part>>;
+
+    /// Refuses a frame that one of its stages lacks.
+    ///
+    /// # Errors
+    /// Lists the frames that exist.
+    fn refuse_missing(&self, frame: i32) -> Result<()> {
+        let frames = self.frames();
+        if frames.binary_search(&frame).is_ok() {
+            return Ok(());
+        }
+        let (count, first, last) = (frames.len(), frames[0], frames[frames.len() - 1]);
+        let what = format!(
+            "frame {frame} is not there: the folder holds {count} frames, {first} to {last}, of {}",
+            self.stages().join(" and ")
+        );
+        Err(Error::file(self.path(), what))
+    }
+}
+
 /// The look of a liquid.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wet {
-    Water,
-    Blood,
-    Paint,
-    Honey,
-    /// Looks that only dyes have.
-    Milk,
-    Coffee,
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wet {
+    pub name: &'static str,
+    /// Linear red, green, blue.
+    pub colour: [f32; 3],
+    /// The depth that absorbs 63 % of the light (m).
+    pub depth: f64,
 }
 
 impl Wet {
-    /// The liquid of a name; blood if the name is unknown.
+    pub const WATER: Self = Self { name: "water", colour: [0.02, 0.16, 0.20], depth: 0.05 };
+    pub const BLOOD: Self = Self { name: "blood", colour: [0.30, 0.008, 0.006], depth: 0.0004 };
+    const PAINT: Self = Self { name: "paint", colour: [0.05, 0.20, 0.60], depth: 0.0002 };
+    const HONEY: Self = Self { name: "honey", colour: [0.70, 0.32, 0.02], depth: 0.012 };
+    pub const MILK: Self = Self { name: "milk", colour: [0.86, 0.84, 0.78], depth: 0.0004 };
+    const COFFEE: Self = Self { name: "coffee", colour: [0.045, 0.013, 0.004], depth: 0.0012 };
+    /// Those of dyes.
+    pub const DYES: [Self; 5] = [Self::BLOOD, Self::PAINT, Self::HONEY, Self::MILK, Self::COFFEE];
+
+    /// The liquid of a name in a scene; blood if the name is unknown.
     pub fn of(name: &str) -> Self {
-        match name {
-            "water" => Self::Water,
-            "paint" => Self::Paint,
-            "honey" => Self::Honey,
-            _ => Self::Blood,
-        }
+        let known = [Self::WATER, Self::PAINT, Self::HONEY].into_iter().find(|known| known.name == name);
+        known.unwrap_or(Self::BLOOD)
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::parts::{Part, of_vdb, points_of};
+use super::parts::{Folder, Part, of_vdb, points_of};
 use frazil::io::mesh::{self, extension};
 use frazil::scene::run::Stored;
 use frazil::scene::{Rebuild, RebuildGrains, Scene};
@@ -56,21 +56,33 @@ impl Shot {
         Ok(Self { folder: folder.to_path_buf(), base, grains, mist, objects, surface, files, frames })
     }
 
-    /// Its path.
-    pub fn folder(&self) -> &Path {
+    /// The surface of the snow after a frame.
+    fn surface(&mut self, ctx: &Context, frame: i32) -> Result<FloatGrid> {
+        if self.base.stored().keeps_changes(frame) {
+            return self.base.layer(ctx, frame)?.surface.deep_copy();
+        }
+        // Whole, though perhaps in 16 bits, from which no run could resume.
+        let path = self.base.stored().file(frame, "base")?;
+        let surface = file::read_own(&path)?.into_iter().find(|grid| grid.name() == "surface");
+        surface.ok_or_else(|| Error::file(path, "has no grid \"surface\""))
+    }
+}
+
+impl Folder for Shot {
+    fn path(&self) -> &Path {
         &self.folder
     }
 
-    /// The frames that all of its stages have, ascending; at least one.
-    pub fn frames(&self) -> &[i32] {
+    fn frames(&self) -> &[i32] {
         &self.frames
     }
 
-    /// Its frame rate, from its scene.
-    ///
-    /// # Errors
-    /// No scene.toml, or one that cannot be read.
-    pub fn fps(&self) -> Result<f64> {
+    fn stages(&self) -> Vec<&str> {
+        let stages = STAGES.iter().zip(&self.files).filter(|(_, files)| !files.is_empty());
+        stages.map(|((name, _), _)| *name).collect()
+    }
+
+    fn fps(&self) -> Result<f64> {
         let scene = Scene::read(&self.folder.join("scene.toml"));
         let fps = scene.map(|scene| scene.shot().fps);
         fps.map_err(|error| {
@@ -78,30 +90,7 @@ impl Shot {
         })
     }
 
-    /// Refuses a frame that one of its stages lacks.
-    ///
-    /// # Errors
-    /// Lists the frames that exist.
-    pub fn refuse_missing(&self, frame: i32) -> Result<()> {
-        if self.frames.binary_search(&frame).is_ok() {
-            return Ok(());
-        }
-        let stages = STAGES.iter().zip(&self.files).filter(|(_, files)| !files.is_empty());
-        let names: Vec<&str> = stages.map(|((name, _), _)| *name).collect();
-        let (first, last) = (self.frames[0], self.frames[self.frames.len() - 1]);
-        let what = format!(
-            "frame {frame} is not there: the folder holds {} frames, {first} to {last}, of {}",
-            self.frames.len(),
-            names.join(" and ")
-        );
-        Err(Error::file(&self.folder, what))
-    }
-
-    /// Reads the contents of a frame; in ascending order, each frame reads one file of each stage.
-    ///
-    /// # Errors
-    /// A file that cannot be read or that is not what was written; cancel.
-    pub fn read(&mut self, ctx: &Context, frame: i32) -> Result<Vec<Part>> {
+    fn read(&mut self, ctx: &Context, frame: i32) -> Result<Vec<Part>> {
         let [base, grains, mist, objects, surface] =
             self.files.each_ref().map(|files| files.get(&frame).cloned());
         let mut parts = Vec::new();
@@ -131,17 +120,6 @@ impl Shot {
             parts.push(Part::Mesh(mesh::read_detailed(&path)?.without_unused()));
         }
         Ok(parts)
-    }
-
-    /// The surface of the snow after a frame.
-    fn surface(&mut self, ctx: &Context, frame: i32) -> Result<FloatGrid> {
-        if self.base.stored().keeps_changes(frame) {
-            return self.base.layer(ctx, frame)?.surface.deep_copy();
-        }
-        // Whole, though perhaps in 16 bits, from which no run could resume.
-        let path = self.base.stored().file(frame, "base")?;
-        let surface = file::read_own(&path)?.into_iter().find(|grid| grid.name() == "surface");
-        surface.ok_or_else(|| Error::file(path, "has no grid \"surface\""))
     }
 }
 

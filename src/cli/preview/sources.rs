@@ -9,7 +9,7 @@ use frazil::{Context, Error, Result, io};
 
 #[cfg(feature = "vdb")]
 use super::parts::of_vdb;
-use super::parts::{Part, points_of};
+use super::parts::{Folder, Part, points_of};
 #[cfg(feature = "vdb")]
 use super::shot::Shot;
 use super::spill::Spill;
@@ -18,9 +18,7 @@ use super::spill::Spill;
 enum Source {
     File(PathBuf),
     Sequence(Pattern),
-    #[cfg(feature = "vdb")]
-    Shot(Box<Shot>),
-    Spill(Box<Spill>),
+    Folder(Box<dyn Folder>),
 }
 
 /// All inputs of a picture.
@@ -105,14 +103,9 @@ impl Sources {
                     let path = pattern.path(whole(frame, &pattern.path(0))?);
                     parts.extend(of_file(&path, None, None, fps)?);
                 }
-                #[cfg(feature = "vdb")]
-                Source::Shot(shot) => {
-                    let frame = whole(frame, shot.folder())?;
-                    parts.extend(shot.read(ctx, frame)?);
-                }
-                Source::Spill(spill) => {
-                    let frame = whole(frame, spill.folder())?;
-                    parts.extend(spill.read(ctx, frame)?);
+                Source::Folder(folder) => {
+                    let frame = whole(frame, folder.path())?;
+                    parts.extend(folder.read(ctx, frame)?);
                 }
             }
         }
@@ -124,10 +117,10 @@ impl Source {
     fn open(path: &Path) -> Result<Self> {
         if path.is_dir() {
             if let Some(spill) = Spill::open(path)? {
-                return Ok(Self::Spill(Box::new(spill)));
+                return Ok(Self::Folder(Box::new(spill)));
             }
             #[cfg(feature = "vdb")]
-            return Ok(Self::Shot(Box::new(Shot::open(path)?)));
+            return Ok(Self::Folder(Box::new(Shot::open(path)?)));
             #[cfg(not(feature = "vdb"))]
             return crate::cli::needs_openvdb(path);
         }
@@ -136,22 +129,12 @@ impl Source {
 
     /// Frames a second, of a shot.
     fn fps(&self) -> Option<Result<f64>> {
-        match self {
-            #[cfg(feature = "vdb")]
-            Self::Shot(shot) => Some(shot.fps()),
-            Self::Spill(spill) => Some(spill.fps()),
-            _ => None,
-        }
+        if let Self::Folder(folder) = self { Some(folder.fps()) } else { None }
     }
 
     /// The frames of a shot.
     fn frames(&self) -> Option<Vec<i32>> {
-        match self {
-            #[cfg(feature = "vdb")]
-            Self::Shot(shot) => Some(shot.frames().to_vec()),
-            Self::Spill(spill) => Some(spill.frames().to_vec()),
-            _ => None,
-        }
+        if let Self::Folder(folder) = self { Some(folder.frames().to_vec()) } else { None }
     }
 
     fn refuse_missing(&self, frame: Option<f64>) -> Result<()> {
@@ -161,9 +144,7 @@ impl Source {
                 let path = pattern.path(whole(frame, &pattern.path(0))?);
                 if path.is_file() { Ok(()) } else { Err(Error::file(path, "is not there")) }
             }
-            #[cfg(feature = "vdb")]
-            Self::Shot(shot) => shot.refuse_missing(whole(frame, shot.folder())?),
-            Self::Spill(spill) => spill.refuse_missing(whole(frame, spill.folder())?),
+            Self::Folder(folder) => folder.refuse_missing(whole(frame, folder.path())?),
         }
     }
 }

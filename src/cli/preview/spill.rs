@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::cli::preview::parts::{Part, Wet};
+use crate::cli::preview::parts::{Folder, Part, Wet};
 use frazil::geometry::TriMesh;
 use frazil::io::mesh;
 use frazil::scene::Scene;
@@ -50,69 +50,6 @@ impl Spill {
         Ok(Some(Self { folder: folder.to_path_buf(), liquid, scene, terrain: None, frames }))
     }
 
-    /// Its path.
-    pub fn folder(&self) -> &Path {
-        &self.folder
-    }
-
-    /// The existing frames, ascending; at least one.
-    pub fn frames(&self) -> &[i32] {
-        &self.frames
-    }
-
-    /// Its frame rate, from its scene.
-    ///
-    /// # Errors
-    /// A scene that cannot be read.
-    pub fn fps(&self) -> Result<f64> {
-        let fps = self.scene.as_ref().map(|scene| scene.shot().fps);
-        fps.ok_or_else(|| {
-            let what = "has no scene.toml that can be read; --fps says how many frames a second there are";
-            Error::file(&self.folder, what)
-        })
-    }
-
-    /// Refuses a frame that does not exist.
-    ///
-    /// # Errors
-    /// Lists the frames that exist.
-    pub fn refuse_missing(&self, frame: i32) -> Result<()> {
-        if self.frames.binary_search(&frame).is_ok() {
-            return Ok(());
-        }
-        let (first, last) = (self.frames[0], self.frames[self.frames.len() - 1]);
-        let count = self.frames.len();
-        let what = format!(
-            "frame {frame} is not there: the folder holds {count} frames, {first} to {last}, of {LIQUID}"
-        );
-        Err(Error::file(&self.folder, what))
-    }
-
-    /// Reads the contents of a frame.
-    ///
-    /// # Errors
-    /// A file that cannot be read or that is not what was written; cancel.
-    pub fn read(&mut self, ctx: &Context, frame: i32) -> Result<Vec<Part>> {
-        let look = self.scene.as_ref().and_then(|scene| scene.shallow().ok());
-        let look = Wet::of(look.map_or("", |liquid| &*liquid.look));
-        let mut parts = self.around(ctx, frame, look);
-        let is_stained = |(at, path): &(i32, String)| *at == frame && path.ends_with(".ply");
-        if self.liquid.files(TERRAIN).iter().any(is_stained) {
-            let stained = mesh::read_detailed(&self.liquid.file_with(frame, TERRAIN, "ply")?)?;
-            let stains = stained.of_vertices("stain").unwrap_or_default();
-            parts.retain(|part| !matches!(part, Part::Ground(..)));
-            parts.push(Part::Ground(stained.mesh, stains, look));
-        }
-        let path = self.liquid.file_with(frame, LIQUID, "ply")?;
-        // A file without faces is not a mesh.
-        let report = self.liquid.report(frame)?;
-        let is_dry = report.is_some_and(|report| report["triangles"].as_u64() == Some(0));
-        if !is_dry {
-            parts.push(Part::Liquid(mesh::read_detailed(&path)?.without_unused(), look));
-        }
-        Ok(parts)
-    }
-
     /// The terrain, and the objects on it; a warning if they cannot be read.
     fn around(&mut self, ctx: &Context, frame: i32, look: Wet) -> Vec<Part> {
         let Some(scene) = &self.scene else { return Vec::new() };
@@ -135,5 +72,48 @@ impl Spill {
                 Vec::new()
             }
         }
+    }
+}
+
+impl Folder for Spill {
+    fn path(&self) -> &Path {
+        &self.folder
+    }
+
+    fn frames(&self) -> &[i32] {
+        &self.frames
+    }
+
+    fn stages(&self) -> Vec<&str> {
+        vec![LIQUID]
+    }
+
+    fn fps(&self) -> Result<f64> {
+        let fps = self.scene.as_ref().map(|scene| scene.shot().fps);
+        fps.ok_or_else(|| {
+            let what = "has no scene.toml that can be read; --fps says how many frames a second there are";
+            Error::file(&self.folder, what)
+        })
+    }
+
+    fn read(&mut self, ctx: &Context, frame: i32) -> Result<Vec<Part>> {
+        let look = self.scene.as_ref().and_then(|scene| scene.shallow().ok());
+        let look = Wet::of(look.map_or("", |liquid| &*liquid.look));
+        let mut parts = self.around(ctx, frame, look);
+        let is_stained = |(at, path): &(i32, String)| *at == frame && path.ends_with(".ply");
+        if self.liquid.files(TERRAIN).iter().any(is_stained) {
+            let stained = mesh::read_detailed(&self.liquid.file_with(frame, TERRAIN, "ply")?)?;
+            let stains = stained.of_vertices("stain").unwrap_or_default();
+            parts.retain(|part| !matches!(part, Part::Ground(..)));
+            parts.push(Part::Ground(stained.mesh, stains, look));
+        }
+        let path = self.liquid.file_with(frame, LIQUID, "ply")?;
+        // A file without faces is not a mesh.
+        let report = self.liquid.report(frame)?;
+        let is_dry = report.is_some_and(|report| report["triangles"].as_u64() == Some(0));
+        if !is_dry {
+            parts.push(Part::Liquid(mesh::read_detailed(&path)?.without_unused(), look));
+        }
+        Ok(parts)
     }
 }

@@ -6,7 +6,7 @@ use crate::cli::preview::parts::Wet;
 use frazil::geometry::DetailedMesh;
 
 /// A scalar that tints a liquid.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Tint {
     /// The scalar: 0 is water, 1 the full dye.
     pub name: String,
@@ -22,8 +22,7 @@ impl FromStr for Tint {
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || "write a scalar and what it looks like, such as dye=blood: blood, paint, honey, milk or coffee";
         let (name, look) = text.split_once('=').ok_or_else(wrong)?;
-        let looks = [Wet::Blood, Wet::Paint, Wet::Honey, Wet::Milk, Wet::Coffee];
-        let look = looks.into_iter().find(|known| known.name() == look).ok_or_else(wrong)?;
+        let look = Wet::DYES.into_iter().find(|known| known.name == look).ok_or_else(wrong)?;
         Ok(Self { name: name.into(), look })
     }
 }
@@ -33,7 +32,7 @@ impl Tint {
     /// that lacks either.
     pub fn of(&self, liquid: &DetailedMesh) -> Option<Tinted> {
         let (shares, depths) = (liquid.of_vertices(&self.name)?, liquid.of_vertices("depth")?);
-        let [clear, dye] = [Wet::Water, self.look].map(|look| (look.colour(), 1.0 / look.depth()));
+        let [clear, dye] = [Wet::WATER, self.look].map(|look| (look.colour, 1.0 / look.depth));
         let vertex = |(share, depth): (f64, f64)| {
             let share = share.clamp(0.0, 1.0);
             let [clear_part, dye_part] = [(1.0 - share) * clear.1, share * dye.1];
@@ -66,7 +65,7 @@ mod tests {
         let (colours, opacities) = tint.of(&DetailedMesh { mesh, uvs: None, arrays }).unwrap();
         assert!(opacities.windows(2).take(2).all(|two| two[0] < two[1]), "{opacities:?}");
         assert!(opacities[0] < 0.05 && opacities[2] > 0.9 && opacities[3] == 0.0, "{opacities:?}");
-        assert_eq!((colours[0], colours[2]), (Wet::Water.colour(), Wet::Milk.colour()));
+        assert_eq!((colours[0], colours[2]), (Wet::WATER.colour, Wet::MILK.colour));
         assert!("milk".parse::<Tint>().is_err() && "milk=snow".parse::<Tint>().is_err());
     }
 }

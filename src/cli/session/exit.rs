@@ -2,6 +2,7 @@
 
 use frazil::Error;
 use std::io::Write;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Exit code: done.
@@ -25,6 +26,11 @@ impl Failure {
     /// An error before the work begins: exit code 2.
     pub fn refused(message: impl std::fmt::Display) -> Self {
         Self { code: REFUSED, message: message.to_string() }
+    }
+
+    /// As [`Failure::refused`], with the name of the file at fault.
+    pub fn of_file(path: &Path, what: impl std::fmt::Display) -> Self {
+        Self::refused(format!("{}: {what}", path.display()))
     }
 
     /// An error after that: exit code 1.

@@ -3,12 +3,12 @@
 use super::VdbOutput;
 use crate::cli::session::Session;
 use crate::cli::session::exit::{Failure, Phase};
-use frazil::vdb::{FloatGrid, file, level_set};
+use frazil::vdb::{FloatGrid, file};
 use frazil::{Context, Result};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
-struct Operands {
+pub struct Operands {
     /// First level set (.vdb)
     a: PathBuf,
     /// Second level set (.vdb), with cells of the same size
@@ -23,46 +23,8 @@ struct Operands {
     output: VdbOutput,
 }
 
-/// Unite two level sets: what lies in A or in B
-#[derive(clap::Args)]
-#[command(after_help = "Example:\n  frazil vdb union left.vdb right.vdb -o both.vdb")]
-pub struct UnionArgs {
-    #[command(flatten)]
-    operands: Operands,
-}
-
-/// Take one level set from another: what lies in A but not in B
-#[derive(clap::Args)]
-#[command(after_help = "Example:\n  frazil vdb difference snow.vdb boot.vdb -o print.vdb")]
-pub struct DifferenceArgs {
-    #[command(flatten)]
-    operands: Operands,
-}
-
-/// Intersect two level sets: what lies in A and in B
-#[derive(clap::Args)]
-#[command(after_help = "Example:\n  frazil vdb intersection snow.vdb boot.vdb -o removed.vdb")]
-pub struct IntersectionArgs {
-    #[command(flatten)]
-    operands: Operands,
-}
-
-/// Runs `union`.
-pub fn union(args: &UnionArgs, session: &Session) -> std::result::Result<(), Failure> {
-    combine(&args.operands, session, "union", level_set::union)
-}
-
-/// Runs `difference`.
-pub fn difference(args: &DifferenceArgs, session: &Session) -> std::result::Result<(), Failure> {
-    combine(&args.operands, session, "difference", level_set::difference)
-}
-
-/// Runs `intersection`.
-pub fn intersection(args: &IntersectionArgs, session: &Session) -> std::result::Result<(), Failure> {
-    combine(&args.operands, session, "intersection", level_set::intersection)
-}
-
-fn combine(
+/// Combines two level sets in a phase of this name.
+pub fn run(
     operands: &Operands,
     session: &Session,
     phase: &'static str,

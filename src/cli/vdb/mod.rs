@@ -18,8 +18,8 @@ use clap::{Subcommand, ValueEnum};
 use frazil::geometry::TriMesh;
 use frazil::geometry::mesh::{BY_OPTION, too_far};
 use frazil::sweep::surface_bytes;
-use frazil::vdb::FloatGrid;
 use frazil::vdb::file::{self, Compression, WriteOptions};
+use frazil::vdb::{FloatGrid, level_set};
 use frazil::{Error, Result};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -41,9 +41,15 @@ enum Command {
     FromMesh(from_mesh::Args),
     FromParticles(from_particles::Args),
     Sweep(sweep::Args),
-    Union(combine::UnionArgs),
-    Difference(combine::DifferenceArgs),
-    Intersection(combine::IntersectionArgs),
+    /// Unite two level sets: what lies in A or in B
+    #[command(after_help = "Example:\n  frazil vdb union left.vdb right.vdb -o both.vdb")]
+    Union(combine::Operands),
+    /// Take one level set from another: what lies in A but not in B
+    #[command(after_help = "Example:\n  frazil vdb difference snow.vdb boot.vdb -o print.vdb")]
+    Difference(combine::Operands),
+    /// Intersect two level sets: what lies in A and in B
+    #[command(after_help = "Example:\n  frazil vdb intersection snow.vdb boot.vdb -o removed.vdb")]
+    Intersection(combine::Operands),
     Offset(filter::OffsetArgs),
     Smooth(filter::SmoothArgs),
     Displace(displace::Args),
@@ -57,9 +63,9 @@ pub fn run(args: Args, session: &Session) -> std::result::Result<(), Failure> {
         Command::FromMesh(args) => from_mesh::run(&args, session),
         Command::FromParticles(args) => from_particles::run(&args, session),
         Command::Sweep(args) => sweep::run(&args, session),
-        Command::Union(args) => combine::union(&args, session),
-        Command::Difference(args) => combine::difference(&args, session),
-        Command::Intersection(args) => combine::intersection(&args, session),
+        Command::Union(args) => combine::run(&args, session, "union", level_set::union),
+        Command::Difference(args) => combine::run(&args, session, "difference", level_set::difference),
+        Command::Intersection(args) => combine::run(&args, session, "intersection", level_set::intersection),
         Command::Offset(args) => filter::offset(&args, session),
         Command::Smooth(args) => filter::smooth(&args, session),
         Command::Displace(args) => displace::run(&args, session),
@@ -140,7 +146,7 @@ fn check_name(path: &Path, extensions: &[&str]) -> std::result::Result<(), Failu
         return Ok(());
     }
     let wanted: Vec<String> = extensions.iter().map(|name| format!(".{name}")).collect();
-    Err(Failure::refused(format!("{}: the output must be a {} file", path.display(), wanted.join(" or "))))
+    Err(Failure::of_file(path, format!("the output must be a {} file", wanted.join(" or "))))
 }
 
 /// The message for a mesh so far away (m) that its file's 32-bit positions are coarse compared with a cell (m).

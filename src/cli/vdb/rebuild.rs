@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use super::{Packing, check_name};
+use crate::cli::options::{of_frame, refuse_one_file};
 use crate::cli::output;
 use crate::cli::session::Session;
 use crate::cli::session::exit::{Failure, Phase};
 use frazil::io::files::atomic;
-use frazil::io::files::sequence::Pattern;
 use frazil::scene::{FrameChoice, Rebuild, RebuildGrains};
 use frazil::vdb::MetaValue;
 use frazil::vdb::file::{self, WriteOptions};
@@ -55,11 +55,7 @@ enum Cache {
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     check_name(&args.output, &["vdb"])?;
     output::check_writable(&args.output).before()?;
-    let pattern = Pattern::parse(&args.output);
-    if pattern.is_none() && args.frame.count() > 1 {
-        let what = format!("{}: several frames need a pattern such as base.%04d.vdb", args.output.display());
-        return Err(Failure::refused(what));
-    }
+    refuse_one_file(&args.output, &args.frame, "base.%04d.vdb")?;
     if args.stage == Of::Grains && args.packing.half {
         return Err(Failure::refused("--half is of no use with --stage grains: points keep 32 bits"));
     }
@@ -72,7 +68,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Cache::Grains(cache) => cache.stored(),
     };
     if let Some(missing) = args.frame.iter().find(|frame| !stored.is_done(*frame)) {
-        return Err(Failure::refused(format!("{}: frame {missing} is not there", args.folder.display())));
+        return Err(Failure::of_file(&args.folder, format!("frame {missing} is not there")));
     }
     let folders = ["base", "removed", "grains", "state"].map(|name| args.folder.join(name));
     let own: Vec<PathBuf> = folders.iter().filter_map(|folder| std::fs::canonicalize(folder).ok()).collect();
@@ -81,11 +77,10 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         _ => std::env::current_dir().ok(),
     };
     if there.is_some_and(|there| own.contains(&there)) {
-        let what = format!("{}: would be written among the cache's own files", args.output.display());
-        return Err(Failure::refused(what));
+        return Err(Failure::of_file(&args.output, "would be written among the cache's own files"));
     }
     for frame in args.frame.iter() {
-        let path = pattern.as_ref().map_or_else(|| args.output.clone(), |pattern| pattern.path(frame));
+        let path = of_frame(&args.output, frame);
         match &mut cache {
             Cache::Base(cache) => {
                 let grids = cache.layer(&session.ctx, frame).during()?;

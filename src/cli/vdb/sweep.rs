@@ -1,7 +1,7 @@
 //! `frazil vdb sweep`.
 
 use super::VdbOutput;
-use crate::cli::options::{MeshSpace, Origin, positive, triple};
+use crate::cli::options::{MeshSpace, Origin, needs_frames, positive, triple};
 use crate::cli::session::Session;
 use crate::cli::session::exit::{Failure, Phase};
 use frazil::geometry::{DVec3, TriMesh};
@@ -133,26 +133,15 @@ impl Args {
             [path, ..] => match Pattern::parse(path) {
                 Some(pattern) => {
                     self.refuse_motion("a sequence", ["--move", "--turn-deg"])?;
-                    let needed = format!("{}: a sequence needs --frames A-B", path.display());
-                    let frames = self.frames.ok_or_else(|| Failure::refused(needed))?;
-                    let (first, last) = (frames.first, frames.last);
-                    let sequence = MeshSequence::open_seen(
-                        pattern,
-                        first,
-                        last,
-                        1.0,
-                        0.0,
-                        Arc::default(),
-                        self.space.origin.at,
-                    )
-                    .before()?;
-                    (Box::new(sequence) as Box<dyn Motion>, first.into(), last.into())
+                    let Frames { first, last } = self.frames.ok_or_else(|| needs_frames(path))?;
+                    let (seen, origin) = (Arc::default(), self.space.origin.at);
+                    let sequence = MeshSequence::open_seen(pattern, first, last, 1.0, 0.0, seen, origin);
+                    (Box::new(sequence.before()?) as Box<dyn Motion>, first.into(), last.into())
                 }
                 None => {
                     self.refuse_motion("one mesh", ["--frames"])?;
                     if self.by.is_none() && self.turn_deg.is_none() {
-                        let what = format!("{}: one mesh needs --move or --turn-deg", path.display());
-                        return Err(Failure::refused(what));
+                        return Err(Failure::of_file(path, "one mesh needs --move or --turn-deg"));
                     }
                     let still = Rigid::of_polygons(self.space.origin.read(path).before()?, Keys::default());
                     (Box::new(still) as Box<dyn Motion>, 0.0, 1.0)
@@ -192,7 +181,7 @@ fn morph(origin: &Origin, from: &Path, to: &Path) -> Result<Box<dyn Motion>, Fai
     let [first, second] = [from, to].map(|path| origin.read(path));
     let (first, second) = (first.before()?, second.before()?);
     if !first.has_faces_of(&second) {
-        return Err(Failure::refused(format!("{}: has other faces than {}", to.display(), from.display())));
+        return Err(Failure::of_file(to, format!("has other faces than {}", from.display())));
     }
     Ok(Box::new(Morph::new(first.into_triangles(), second.positions).before()?))
 }

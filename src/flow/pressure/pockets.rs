@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::operator::{Operator, layer};
 use super::stencil::Stencil;
 use crate::flow::tiles::{FACES, NONE, Tile};
+use crate::geometry::check::topology::Sets;
 
 /// Label of a cell that does not take part.
 const SOLID: u16 = u16::MAX;
@@ -42,13 +43,13 @@ impl Pockets {
             first.push(count);
             count += parts.count;
         }
-        let mut groups = Groups { parents: (0..count).collect() };
+        let mut groups = Sets::new(count as usize);
         for slot in 0..active {
             for axis in 0..3 {
                 let above = operator.tiles.neighbours()[slot][FACES[2 * axis + 1]] as usize;
                 if above < active {
                     let pair = [(first[slot], &parts[slot]), (first[above], &parts[above])];
-                    groups.join_tiles(axis, pair, operator.stencil(slot));
+                    join_tiles(&mut groups, axis, pair, operator.stencil(slot));
                 }
             }
         }
@@ -165,41 +166,20 @@ fn open(stencil: &Stencil, axis: usize, is_upper: bool, cell: usize) -> f32 {
     }
 }
 
-/// Disjoint sets of components.
-struct Groups {
-    parents: Vec<u32>,
-}
-
-impl Groups {
-    fn root(&mut self, mut part: u32) -> u32 {
-        while self.parents[part as usize] != part {
-            let above = self.parents[part as usize];
-            self.parents[part as usize] = self.parents[above as usize];
-            part = above;
-        }
-        part
-    }
-
-    fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.parents[a.max(b) as usize] = a.min(b);
-    }
-
-    /// Joins the components of two tiles through the faces between them.
-    fn join_tiles(&mut self, axis: usize, [below, above]: [(u32, &Parts); 2], stencil: Option<&Stencil>) {
-        let part = |(first, parts): (u32, &Parts), cell: usize| match &parts.labels {
-            Some(labels) => (labels[cell] != SOLID).then(|| first + u32::from(labels[cell])),
-            None => Some(first),
-        };
-        let step = 64 >> (3 * axis);
-        for at in 0..64 {
-            let low = super::operator::first(axis, at);
-            let last = low + 7 * step;
-            if stencil.is_none_or(|stencil| open(stencil, axis, true, last) > 0.0)
-                && let (Some(a), Some(b)) = (part(below, last), part(above, low))
-            {
-                self.join(a, b);
-            }
+/// Joins the components of two tiles through the faces between them.
+fn join_tiles(groups: &mut Sets, axis: usize, [below, above]: [(u32, &Parts); 2], stencil: Option<&Stencil>) {
+    let part = |(first, parts): (u32, &Parts), cell: usize| match &parts.labels {
+        Some(labels) => (labels[cell] != SOLID).then(|| first + u32::from(labels[cell])),
+        None => Some(first),
+    };
+    let step = 64 >> (3 * axis);
+    for at in 0..64 {
+        let low = super::operator::first(axis, at);
+        let last = low + 7 * step;
+        if stencil.is_none_or(|stencil| open(stencil, axis, true, last) > 0.0)
+            && let (Some(a), Some(b)) = (part(below, last), part(above, low))
+        {
+            groups.join(a, b);
         }
     }
 }

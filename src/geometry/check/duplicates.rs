@@ -17,12 +17,7 @@ impl Doubles {
     pub(in crate::geometry) fn of(triangles: &[[u32; 3]], uses: &[Use]) -> Self {
         let count = triangles.len();
         let mut out = Self { is_double: vec![false; count], is_two_sided: vec![false; count] };
-        let by_vertices = |(&[a, b, c], number): (&[u32; 3], u32)| {
-            let [a, b, c] = [a, b, c].min([b, c, a]).min([c, a, b]);
-            ([a, b.min(c), b.max(c)], number, b < c)
-        };
-        let mut order: Vec<([u32; 3], u32, bool)> = triangles.iter().zip(0..).map(by_vertices).collect();
-        order.par_sort_unstable();
+        let order = by_vertices(triangles);
         let mut is_alone = vec![true; count];
         for same in order.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() > 1) {
             let is_two_sided = same.iter().any(|(_, _, way)| *way != same[0].2);
@@ -51,6 +46,22 @@ impl Doubles {
         }
         out
     }
+}
+
+/// Corners of a triangle, starting with the smallest, so that triangles of the same orientation compare equal.
+pub fn rotated<T: Ord + Copy>([a, b, c]: [T; 3]) -> [T; 3] {
+    [a, b, c].min([b, c, a]).min([c, a, b])
+}
+
+/// Triangles sorted by their vertices, these ascending: each with its index, and whether it has them in one or the other orientation.
+pub fn by_vertices(triangles: &[[u32; 3]]) -> Vec<([u32; 3], u32, bool)> {
+    let sorted = |(triangle, number): (&[u32; 3], u32)| {
+        let [a, b, c] = rotated(*triangle);
+        ([a, b.min(c), b.max(c)], number, b < c)
+    };
+    let mut order: Vec<([u32; 3], u32, bool)> = triangles.iter().zip(0..).map(sorted).collect();
+    order.par_sort_unstable();
+    order
 }
 
 /// Marks the triangles of parts that coincide with an earlier part, triangle by triangle: their keys are the same. `is_compared` selects

@@ -1,6 +1,7 @@
 //! Edges of triangles, the parts that they connect, and neighbours that agree on which side is out.
 
 use super::topology::Sets;
+use crate::geometry::lists::Lists;
 
 /// An edge, smaller vertex index first, and a triangle that has it.
 pub type Use = ([u32; 2], u32);
@@ -12,25 +13,11 @@ const SMALLEST: u32 = 4;
 
 /// The edges of triangles over `vertices` vertices, sorted, each with all triangles that have it.
 pub fn edge_uses(vertices: usize, triangles: &[[u32; 3]]) -> Vec<Use> {
-    // Counting sort by the smaller vertex, then comparisons: few edges begin at one vertex.
-    let mut next = vec![0usize; vertices + 1];
-    triangles.iter().flat_map(sides).for_each(|ends| next[ends[0] as usize + 1] += 1);
-    (0..vertices).for_each(|vertex| next[vertex + 1] += next[vertex]);
-    let mut uses: Vec<Use> = vec![([0; 2], 0); 3 * triangles.len()];
-    for (triangle, number) in triangles.iter().zip(0..) {
-        for ends in sides(triangle) {
-            let position = &mut next[ends[0] as usize];
-            uses[*position] = (ends, number);
-            *position += 1;
-        }
-    }
-    // Each offset has advanced to the end of its vertex.
-    let mut begin = 0;
-    for &end in &next[..vertices] {
-        uses[begin..end].sort_unstable();
-        begin = end;
-    }
-    uses
+    // By the smaller vertex, then by comparisons: few edges begin at one vertex.
+    let of_triangle = |(triangle, number)| sides(triangle).map(|ends| (ends[0], (ends, number)));
+    let mut uses = Lists::new(vertices, triangles.iter().zip(0..).flat_map(of_triangle));
+    uses.each_mut(|uses| uses.sort_unstable());
+    uses.into_items()
 }
 
 /// The edges of a triangle, smaller vertex index first.

@@ -7,6 +7,7 @@ use super::predicates::is_flat;
 use super::topology::{Survey, Topology, collapsed, firsts, groups, parts};
 use crate::geometry::mesh::weld::Weld;
 use crate::geometry::mesh::{coincident, used};
+use crate::geometry::shape::{bounds, six_volumes};
 use crate::geometry::spatial::bvh::Bvh;
 use crate::geometry::spatial::near_pairs::Near;
 use crate::geometry::{DVec3, TriMesh};
@@ -200,15 +201,9 @@ const ASLANT: DVec3 = DVec3::new(0.5773, 0.6533, 0.4896);
 
 impl<'a> Part<'a> {
     fn of(mesh: &TriMesh, triangles: &'a [usize]) -> Self {
-        let corners = || Self::corners(mesh, triangles);
-        let nowhere = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
-        let (low, high) =
-            corners().fold(nowhere, |(low, high), position| (low.inf(&position), high.sup(&position)));
-        let six = |&triangle: &usize| {
-            let [a, b, c] = mesh.corners(triangle).map(|p| p - low);
-            a.dot(&b.cross(&c))
-        };
-        let volume = triangles.iter().map(six).sum::<f64>() / 6.0 + 0.0;
+        let (low, high) = bounds(Self::corners(mesh, triangles));
+        let six = triangles.iter().map(|&triangle| six_volumes(&mesh.corners(triangle), &low));
+        let volume = six.sum::<f64>() / 6.0 + 0.0;
         let none = ROUNDING * (high - low).norm().powi(3);
         Self { triangles, volume: if volume.abs() > none { volume } else { 0.0 } }
     }

@@ -219,14 +219,16 @@ pub(in crate::geometry) fn groups(vertices: usize, links: impl Iterator<Item = [
 
 /// Disjoint sets: each index points to a smaller one of its set, the smallest to itself.
 #[derive(Clone)]
-pub(in crate::geometry) struct Sets(Vec<u32>);
+pub struct Sets(Vec<u32>);
 
 impl Sets {
-    pub(in crate::geometry) fn new(count: usize) -> Self {
+    /// Sets of one index each.
+    pub fn new(count: usize) -> Self {
         Self((0..count as u32).collect())
     }
 
-    pub(in crate::geometry) fn root(&mut self, mut at: u32) -> u32 {
+    /// The smallest index of a set.
+    pub fn root(&mut self, mut at: u32) -> u32 {
         while self.0[at as usize] != at {
             let up = self.0[self.0[at as usize] as usize];
             self.0[at as usize] = up;
@@ -235,9 +237,21 @@ impl Sets {
         at
     }
 
-    pub(in crate::geometry) fn join(&mut self, a: u32, b: u32) {
+    /// Joins the sets of two indices.
+    pub fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
         self.0[a.max(b) as usize] = a.min(b);
+    }
+
+    /// The set of each index, numbered in the order of their smallest ones, and the count of sets.
+    pub fn numbered(mut self) -> (Vec<u32>, usize) {
+        let (mut numbers, mut count) = (vec![0; self.0.len()], 0);
+        for at in 0..numbers.len() {
+            let root = self.root(at as u32) as usize;
+            numbers[at] = if root == at { count } else { numbers[root] };
+            count += u32::from(root == at);
+        }
+        (numbers, count as usize)
     }
 
     fn roots(&self) -> impl Iterator<Item = usize> {

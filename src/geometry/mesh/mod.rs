@@ -5,6 +5,8 @@ pub mod polygons;
 pub mod uvs;
 pub mod weld;
 
+use super::check::edges::{Use, edge_uses, imbalance, is_same_edge};
+use super::shape::six_volumes;
 use super::{DVec3, Vec3};
 use crate::error::{Error, Result};
 
@@ -74,11 +76,8 @@ impl TriMesh {
     pub fn volume(&self) -> f64 {
         let Some((low, _)) = self.bounds() else { return 0.0 };
         let origin: DVec3 = low.cast();
-        let six = |triangle: usize| {
-            let [a, b, c] = self.corners(triangle).map(|p| p - origin);
-            a.dot(&b.cross(&c))
-        };
-        (0..self.triangles.len()).map(six).sum::<f64>() / 6.0 + 0.0
+        let six = (0..self.triangles.len()).map(|triangle| six_volumes(&self.corners(triangle), &origin));
+        six.sum::<f64>() / 6.0 + 0.0
     }
 
     /// Surface area (m2).
@@ -90,37 +89,27 @@ impl TriMesh {
         (0..self.triangles.len()).map(twice).sum::<f64>() / 2.0 + 0.0
     }
 
-    /// The edges of each triangle, sorted, smaller vertex index first: with 1 if the triangle runs along the edge in this order, else -1.
-    fn edge_uses(&self) -> Vec<((u32, u32), i32)> {
-        let mut edges: Vec<((u32, u32), i32)> = self
-            .triangles
-            .iter()
-            .flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)])
-            .map(|(i, j)| if i < j { ((i, j), 1) } else { ((j, i), -1) })
-            .collect();
-        edges.sort_unstable();
-        edges
+    fn edge_uses(&self) -> Vec<Use> {
+        edge_uses(self.positions.len(), &self.triangles)
     }
 
     /// Whether every edge is used as often in one direction as in the other.
     pub fn is_closed(&self) -> bool {
-        let edges = self.edge_uses();
-        edges.chunk_by(|a, b| a.0 == b.0).all(|uses| uses.iter().map(|(_, way)| way).sum::<i32>() == 0)
+        self.edge_uses().chunk_by(is_same_edge).all(|run| imbalance(&self.triangles, run) == 0)
     }
 
     /// Whether it is closed and no edge has more than two triangles.
     pub fn is_manifold(&self) -> bool {
-        let edges = self.edge_uses();
-        edges.chunk_by(|a, b| a.0 == b.0).all(|uses| uses.len() == 2 && uses[0].1 + uses[1].1 == 0)
+        let is_whole = |run: &[Use]| run.len() == 2 && imbalance(&self.triangles, run) == 0;
+        self.edge_uses().chunk_by(is_same_edge).all(is_whole)
     }
 
     /// Vertices minus edges plus faces, counting only used vertices: 2 for a sphere.
     pub fn euler_characteristic(&self) -> i64 {
-        let mut used: Vec<u32> = self.triangles.as_flattened().to_vec();
-        used.sort_unstable();
-        used.dedup();
-        let edges = self.edge_uses().chunk_by(|a, b| a.0 == b.0).count();
-        used.len() as i64 - edges as i64 + self.triangles.len() as i64
+        let used =
+            used(self.positions.len(), &self.triangles).map_or(self.positions.len(), |used| used.len());
+        let edges = self.edge_uses().chunk_by(is_same_edge).count();
+        used as i64 - edges as i64 + self.triangles.len() as i64
     }
 
     /// The mesh with its triangles flipped.
@@ -157,6 +146,30 @@ pub fn renumbered(triangles: &[[u32; 3]], used: &[u32]) -> Vec<[u32; 3]> {
     let mut positions = vec![0; used.last().map_or(0, |&last| last as usize + 1)];
     used.iter().zip(0..).for_each(|(&vertex, position)| positions[vertex as usize] = position);
     triangles.iter().map(|triangle| triangle.map(|vertex| positions[vertex as usize])).collect()
+}
+
+/// The vertices out of `count` that triangles use, ascending, and the triangles re-indexed to these.
+pub fn compact(count: usize, triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<[u32; 3]>) {
+    let names = used(count, triangles).unwrap_or_else(|| (0..count as u32).collect());
+    let triangles = renumbered(triangles, &names);
+    (names, triangles)
+}
+
+/// Drops values whose mark is set; those beyond the marks stay.
+pub fn drop_marked<T>(values: &mut Vec<T>, marks: &[bool]) {
+    let mut marks = marks.iter();
+    values.retain(|_| marks.next() != Some(&true));
+}
+
+/// Re-indexes corners after marked vertices, which none of them is, were dropped.
+pub fn renumber_kept(corners: &mut [u32], is_dropped: &[bool]) {
+    let mut kept = 0;
+    let number = |is_dropped: &bool| {
+        kept += u32::from(!is_dropped);
+        kept - u32::from(!is_dropped)
+    };
+    let numbers: Vec<u32> = is_dropped.iter().map(number).collect();
+    corners.iter_mut().for_each(|vertex| *vertex = numbers[*vertex as usize]);
 }
 
 /// Spacing of 32-bit numbers at a coordinate: the resolution of a mesh file there.
@@ -208,15 +221,8 @@ pub fn coincident(positions: impl Iterator<Item = DVec3>) -> Vec<u32> {
     // Open addressing, at most half full: several times faster than a map; a host needs this in every step.
     let bits = (2 * keys.len().max(1)).next_power_of_two().ilog2().max(1);
     let mut slots = vec![u32::MAX; 1 << bits];
-    let home = |key: &[u64; 3]| {
-        let mixed = key.iter().fold(0u64, |hash, part| {
-            let hash = (hash.rotate_left(23) ^ part).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            hash ^ hash >> 32
-        });
-        (mixed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - bits)) as usize
-    };
     let first = |(key, number): (&[u64; 3], u32)| {
-        let mut slot = home(key);
+        let mut slot = home(key, bits);
         loop {
             match slots[slot] {
                 u32::MAX => {
@@ -229,6 +235,15 @@ pub fn coincident(positions: impl Iterator<Item = DVec3>) -> Vec<u32> {
         }
     };
     keys.iter().zip(0..).map(first).collect()
+}
+
+/// The slot of a key in a hash table of 2^`bits` slots.
+fn home(key: &[u64; 3], bits: u32) -> usize {
+    let mixed = key.iter().fold(0u64, |hash, part| {
+        let hash = (hash.rotate_left(23) ^ part).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        hash ^ hash >> 32
+    });
+    (mixed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - bits)) as usize
 }
 
 /// Checks the vertices and faces of a mesh.

@@ -2,9 +2,8 @@
 
 use super::validate;
 use crate::error::{Error, Result};
-use crate::geometry::triangulate::ear_clipping;
 use crate::geometry::triangulate::ear_clipping::turn;
-use crate::geometry::triangulate::monotone;
+use crate::geometry::triangulate::{ear_clipping, monotone};
 use crate::geometry::{DVec3, DetailedMesh, MeshArray, TriMesh, Uvs, Vec3};
 
 /// Maximum corners of a polygon: cutting it takes some 300 bytes for each, which no memory limit sees.
@@ -78,32 +77,25 @@ impl PolygonMesh {
     }
 
     /// The mesh as triangles, with its texture coordinates.
-    pub fn into_textured(mut self) -> (TriMesh, Option<Uvs>) {
-        let uvs = self.uvs.take().map(|uvs| match uvs.corners {
-            Some(_) => {
-                let mut corners = Vec::with_capacity(self.triangle_count());
-                self.cut_all(|begin, _, triangle| corners.push(triangle.map(|corner| begin + corner)));
-                uvs.of_triangles(&corners)
-            }
-            None => uvs,
-        });
-        (self.into_triangles(), uvs)
+    pub fn into_textured(self) -> (TriMesh, Option<Uvs>) {
+        let DetailedMesh { mesh, uvs, .. } = Self { arrays: Vec::new(), ..self }.into_detailed();
+        (mesh, uvs)
     }
 
     /// The mesh as triangles, with everything that it carries.
     pub fn into_detailed(mut self) -> DetailedMesh {
-        let arrays = std::mem::take(&mut self.arrays);
-        if arrays.is_empty() {
-            let (mesh, uvs) = self.into_textured();
-            return DetailedMesh { mesh, uvs, arrays };
+        let (arrays, uvs) = (std::mem::take(&mut self.arrays), self.uvs.take());
+        let (mut corners, mut faces) = (Vec::new(), Vec::new());
+        if !arrays.is_empty() || uvs.as_ref().is_some_and(|uvs| uvs.corners.is_some()) {
+            self.cut_all(|begin, _, triangle| corners.push(triangle.map(|corner| begin + corner)));
         }
-        let mut corners = Vec::with_capacity(self.triangle_count());
-        self.cut_all(|begin, _, triangle| corners.push(triangle.map(|corner| begin + corner)));
-        let face = |corner: usize| self.ends.partition_point(|end| *end as usize <= corner);
-        let faces: Vec<usize> = corners.iter().map(|triangle| face(triangle[0])).collect();
+        if !arrays.is_empty() {
+            let face = |corner: usize| self.ends.partition_point(|end| *end as usize <= corner);
+            faces.extend(corners.iter().map(|triangle| face(triangle[0])));
+        }
+        let uvs = uvs.map(|uvs| uvs.of_triangles(&corners));
         let arrays = arrays.into_iter().map(|array| array.of_triangles(&corners, &faces)).collect();
-        let (mesh, uvs) = self.into_textured();
-        DetailedMesh { mesh, uvs, arrays }
+        DetailedMesh { mesh: self.into_triangles(), uvs, arrays }
     }
 
     fn triangle_count(&self) -> usize {

@@ -16,9 +16,10 @@
 //!
 //! The nearest corners are joined first, and never both ends of an edge: a triangle as thin as the rounding is kept.
 
-use super::coincident;
+use super::{coincident, home};
 use crate::geometry::DVec3;
 use crate::geometry::check::topology::Sets;
+use crate::geometry::lists::Lists;
 
 /// Corners may be this many adjacent 32-bit numbers apart on each axis.
 pub const STEPS: i64 = 4;
@@ -60,7 +61,8 @@ impl Weld {
         }
         let places: Vec<[f32; 3]> =
             boundary.vertices.iter().map(|&vertex| positions[vertex as usize].cast::<f32>().into()).collect();
-        let links = Links::of(boundary);
+        let both = boundary.edges.iter().flat_map(|&([a, b], _)| [(a, b), (b, a)]);
+        let links = Lists::new(boundary.vertices.len(), both);
         let mut rounds = Rounds::new(boundary, &links);
         let undecided = rounds.join(&Ruler::OWN.measure(&places), false);
         let coarse = Ruler::of_extent(&places).map(|ruler| ruler.measure(&places));
@@ -108,23 +110,14 @@ impl Boundary {
     /// `firsts` has the first vertex at the same position for each; triangles that use one of these twice do not count.
     pub fn of(triangles: &[[u32; 3]], firsts: &[u32]) -> Self {
         let named = |corners: &[u32; 3]| corners.map(|vertex| firsts[vertex as usize]);
-        let whole = || triangles.iter().map(named).filter(|[a, b, c]| a != b && b != c && c != a);
-        let sides = |[a, b, c]: [u32; 3]| [[a, b], [b, c], [c, a]].map(|[i, j]| [i.min(j), i.max(j)]);
-        // Counting sort by the smaller vertex: few edges begin at one vertex.
-        let mut begins = vec![0u32; firsts.len() + 1];
-        whole().flat_map(sides).for_each(|[least, _]| begins[least as usize + 1] += 1);
-        (0..firsts.len()).for_each(|vertex| begins[vertex + 1] += begins[vertex]);
-        let mut next = begins.clone();
-        let mut ends = vec![0u32; begins[firsts.len()] as usize];
-        for [least, most] in whole().flat_map(sides) {
-            ends[next[least as usize] as usize] = most;
-            next[least as usize] += 1;
-        }
+        let whole = triangles.iter().map(named).filter(|[a, b, c]| a != b && b != c && c != a);
+        let sides = |[a, b, c]: [u32; 3]| [[a, b], [b, c], [c, a]].map(|[i, j]| (i.min(j), i.max(j)));
+        // Few edges begin at one vertex.
+        let mut ends = Lists::new(firsts.len(), whole.flat_map(sides));
+        ends.each_mut(|ends| ends.sort_unstable());
         let mut is_open = vec![false; firsts.len()];
         for vertex in 0..firsts.len() {
-            let others = &mut ends[begins[vertex] as usize..begins[vertex + 1] as usize];
-            others.sort_unstable();
-            for run in others.chunk_by(|a, b| a == b).filter(|run| run.len() == 1) {
+            for run in ends.get(vertex).chunk_by(|a, b| a == b).filter(|run| run.len() == 1) {
                 is_open[vertex] = true;
                 is_open[run[0] as usize] = true;
             }
@@ -138,8 +131,8 @@ impl Boundary {
         vertices.iter().zip(0..).for_each(|(&vertex, index)| own[vertex as usize] = index);
         let mut edges = Vec::new();
         for (&vertex, index) in vertices.iter().zip(0..) {
-            let others = &ends[begins[vertex as usize] as usize..begins[vertex as usize + 1] as usize];
-            for run in others.chunk_by(|a, b| a == b).filter(|run| own[run[0] as usize] != u32::MAX) {
+            let runs = ends.get(vertex as usize).chunk_by(|a, b| a == b);
+            for run in runs.filter(|run| own[run[0] as usize] != u32::MAX) {
                 edges.push(([index, own[run[0] as usize]], run.len() as u32));
             }
         }
@@ -194,37 +187,12 @@ impl Ruler {
     }
 }
 
-/// For each vertex of a boundary, the other ends of its edges.
-struct Links {
-    begins: Vec<u32>,
-    ends: Vec<u32>,
-}
-
-impl Links {
-    fn of(boundary: &Boundary) -> Self {
-        let mut begins = vec![0u32; boundary.vertices.len() + 1];
-        let both = || boundary.edges.iter().flat_map(|&([a, b], _)| [[a, b], [b, a]]);
-        both().for_each(|[from, _]| begins[from as usize + 1] += 1);
-        (1..begins.len()).for_each(|vertex| begins[vertex] += begins[vertex - 1]);
-        let mut next = begins.clone();
-        let mut ends = vec![0; 2 * boundary.edges.len()];
-        for [from, to] in both() {
-            ends[next[from as usize] as usize] = to;
-            next[from as usize] += 1;
-        }
-        Self { begins, ends }
-    }
-
-    fn around(&self, vertex: u32) -> &[u32] {
-        &self.ends[self.begins[vertex as usize] as usize..self.begins[vertex as usize + 1] as usize]
-    }
-}
-
 /// The joined vertices of the boundary, round by round.
 #[derive(Clone)]
 struct Rounds<'a> {
     boundary: &'a Boundary,
-    links: &'a Links,
+    /// For each vertex, the other ends of its edges.
+    links: &'a Lists<u32>,
     sets: Sets,
     /// For each vertex the next one of its set, as a ring.
     next: Vec<u32>,
@@ -235,7 +203,7 @@ struct Rounds<'a> {
 }
 
 impl<'a> Rounds<'a> {
-    fn new(boundary: &'a Boundary, links: &'a Links) -> Self {
+    fn new(boundary: &'a Boundary, links: &'a Lists<u32>) -> Self {
         let count = boundary.vertices.len();
         let next = (0..count as u32).collect();
         Self { boundary, links, sets: Sets::new(count), next, is_chained: vec![false; count], joined: 0 }
@@ -257,7 +225,7 @@ impl<'a> Rounds<'a> {
         }
         for (_, [a, b]) in pairs {
             let roots = [a, b].map(|vertex| self.sets.root(vertex));
-            if roots[0] == roots[1] || self.links.around(a).contains(&b) {
+            if roots[0] == roots[1] || self.links.get(a as usize).contains(&b) {
                 continue;
             }
             let both = united(boxes[roots[0] as usize], boxes[roots[1] as usize]);
@@ -288,7 +256,7 @@ impl<'a> Rounds<'a> {
     fn share_an_edge(&mut self, [from, to]: [u32; 2]) -> bool {
         let mut at = from;
         loop {
-            if self.links.around(at).iter().any(|&other| self.sets.root(other) == to) {
+            if self.links.get(at as usize).iter().any(|&other| self.sets.root(other) == to) {
                 return true;
             }
             at = self.next[at as usize];
@@ -403,17 +371,10 @@ fn near_pairs(steps: &[[i64; 3]], some: &[u32]) -> (Vec<NearPair>, Vec<u32>) {
     let cell = |at: [i64; 3]| at.map(|step| step.div_euclid(CELL));
     // Open addressing, at most half full; each slot leads to the last vertex of its cell, and each vertex to the one before it.
     let bits = (2 * some.len().max(1)).next_power_of_two().ilog2().max(1);
-    let home = |key: [i64; 3]| {
-        let mixed = key.iter().fold(0u64, |hash, &part| {
-            let hash = (hash.rotate_left(23) ^ part as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            hash ^ hash >> 32
-        });
-        (mixed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - bits)) as usize
-    };
     let mut slots = vec![u32::MAX; 1 << bits];
     let mut before = vec![u32::MAX; steps.len()];
     let find = |slots: &[u32], key: [i64; 3]| {
-        let mut slot = home(key);
+        let mut slot = home(&key.map(|part| part as u64), bits);
         while slots[slot] != u32::MAX && cell(steps[slots[slot] as usize]) != key {
             slot = (slot + 1) & ((1 << bits) - 1);
         }

@@ -73,9 +73,7 @@ impl Kind {
     /// An unsigned integer over 2^63 - 1; the stop flag.
     pub fn decode(self, bytes: &[u8], order: Order, out: &mut Numbers) -> Result<(), String> {
         for piece in bytes.chunks(PIECE * self.size()) {
-            if source::is_stopped() {
-                return Err("stopped".into());
-            }
+            source::go_on(0, 1)?;
             self.decode_piece(piece, order, out)?;
         }
         Ok(())

@@ -33,6 +33,14 @@ pub fn check() -> Result<()> {
     if is_stopped() { Err(Error::Cancelled) } else { Ok(()) }
 }
 
+/// Fails if readers must stop. Called for each item of a file that is parsed; it looks every `piece` items.
+///
+/// # Errors
+/// A text that nobody sees: the flag tells.
+pub fn go_on(item: usize, piece: usize) -> std::result::Result<(), String> {
+    if item.is_multiple_of(piece) && is_stopped() { Err("stopped".into()) } else { Ok(()) }
+}
+
 /// Opens a regular file: reading a pipe, a terminal or a device may never end, or never begin.
 ///
 /// # Errors

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::extension;
 use crate::error::Result;
 use crate::io::files::{source, text};
 
@@ -10,8 +11,7 @@ use crate::io::files::{source, text};
 /// # Errors
 /// A file that cannot be read.
 pub fn of(path: &Path) -> Result<Vec<&'static str>> {
-    let kind = path.extension().and_then(|text| text.to_str()).unwrap_or("").to_lowercase();
-    Ok(match kind.as_str() {
+    Ok(match extension(path).as_str() {
         "obj" => obj(&source::read(path)?),
         "ply" => ply(&source::read(path)?),
         _ => Vec::new(),

@@ -22,9 +22,7 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<PolygonMesh
     let mut lines = text::lines(text::without_mark(bytes)?);
     let mut joined = Vec::new();
     while let Some((number, line)) = lines.next() {
-        if number % PIECE == 0 && source::is_stopped() {
-            return Err("stopped".into());
-        }
+        source::go_on(number, PIECE)?;
         let read = match continued(line) {
             None => reader.line(line),
             Some(begin) => {

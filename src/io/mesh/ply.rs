@@ -37,9 +37,7 @@ impl Body<'_> {
         row: usize,
         mut take: impl FnMut(usize, f64),
     ) -> Result<(), String> {
-        if row.is_multiple_of(PIECE) && source::is_stopped() {
-            return Err("stopped".into());
-        }
+        source::go_on(row, PIECE)?;
         for (n, property) in element.properties.iter().enumerate() {
             let read = match property.list {
                 None => self.reader.number(property.number).map(|value| take(n, value)),
@@ -64,9 +62,7 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<PolygonMesh
     // An element without properties has no rows in the file, whatever its count.
     for element in elements.iter().filter(|element| !element.properties.is_empty()) {
         for row in 0..element.count {
-            if row.is_multiple_of(PIECE) && source::is_stopped() {
-                return Err("stopped".into());
-            }
+            source::go_on(row, PIECE)?;
             read_row(&mut reader, element, &mut parsed).map_err(|fault| fault.at(element, row))?;
         }
     }

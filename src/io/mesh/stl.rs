@@ -34,9 +34,7 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<(PolygonMes
     }
     let mut joined = Joined::default();
     for (number, triangle) in bytes[HEADER..length].chunks_exact(TRIANGLE).enumerate() {
-        if number % PIECE == 0 && source::is_stopped() {
-            return Err("stopped".into());
-        }
+        source::go_on(number, PIECE)?;
         let value = |at: usize| {
             let raw = &triangle[NORMAL + 4 * at..][..4];
             f32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]])

@@ -32,9 +32,7 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<(PolygonMes
     let mut is_open = false;
     while let Some(word) = reader.words.next() {
         if is(word, "facet") {
-            if reader.facets.is_multiple_of(PIECE) && source::is_stopped() {
-                return Err("stopped".into());
-            }
+            source::go_on(reader.facets, PIECE)?;
             reader.facet()?;
             is_open = true;
         } else if is(word, "solid") {

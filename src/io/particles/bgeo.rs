@@ -59,9 +59,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<ParticleColumns, String> {
     let mut rows = vec![0; (PIECE / row).clamp(1, head.points.max(1)) * row];
     let mut done = 0;
     while done < head.points {
-        if source::is_stopped() {
-            return Err("stopped".into());
-        }
+        source::go_on(0, 1)?;
         let count = (rows.len() / row).min(head.points - done);
         let piece = &mut rows[..count * row];
         reader.read_exact(piece).map_err(|error| match error.kind() {
@@ -97,9 +95,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<ParticleColumns, String> {
 fn read_to_the_end(reader: &mut dyn Read) -> Result<(), String> {
     let mut rest = vec![0; PIECE];
     loop {
-        if source::is_stopped() {
-            return Err("stopped".into());
-        }
+        source::go_on(0, 1)?;
         if reader.read(&mut rest).map_err(|error| damaged(&error))? == 0 {
             return Ok(());
         }

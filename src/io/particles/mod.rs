@@ -254,27 +254,11 @@ impl ParticleColumns {
             self.leave_out(name);
             return Ok(());
         }
-        let values = match (components, name, numbers) {
-            (3, _, numbers) => {
-                let numbers = numbers.into_reals();
-                let vectors = numbers.chunks_exact(3).map(|v| [0, 1, 2].map(|axis| v[axis] as f32)).collect();
-                Values::Vector(shared(vectors, |v| v.map(f32::to_bits)))
-            }
-            (_, "id", Numbers::Real(numbers)) => Values::Long(shared(whole(name, &numbers)?, |&id| id)),
-            (_, "id", Numbers::Whole(numbers)) => Values::Long(shared(numbers, |&id| id)),
-            (_, "active" | "trapped", numbers) => {
-                let yes = numbers.into_reals().into_iter().map(|value| value != 0.0).collect();
-                Values::Bool(shared(yes, |&yes| yes))
-            }
-            (_, _, Numbers::Real(numbers)) => {
-                let floats = numbers.into_iter().map(|value| value as f32).collect();
-                Values::Float(shared(floats, |value| value.to_bits()))
-            }
-            (_, _, Numbers::Whole(numbers)) if kind.fits_int() => {
-                let whole = numbers.into_iter().map(|value| value as i32).collect();
-                Values::Int(shared(whole, |&value| value))
-            }
-            (_, _, Numbers::Whole(numbers)) => Values::Long(shared(numbers, |&value| value)),
+        let values = if components == 3 {
+            let numbers = numbers.into_reals();
+            vectors(numbers.chunks_exact(3).map(|v| [0, 1, 2].map(|axis| v[axis] as f32)))
+        } else {
+            scalars(name, numbers, kind.fits_int())?
         };
         self.attributes.push(Attribute { name: name.into(), values });
         Ok(())
@@ -291,8 +275,33 @@ impl ParticleColumns {
     }
 }
 
+/// An attribute of vectors.
+fn vectors(all: impl Iterator<Item = [f32; 3]>) -> Values {
+    Values::Vector(shared(all.collect(), |v| v.map(f32::to_bits)))
+}
+
+/// An attribute of one number for each particle: its type depends on its name, on that of the numbers, and on whether integers fit 32 bits.
+fn scalars(name: &str, numbers: Numbers, fits_int: bool) -> std::result::Result<Values, String> {
+    Ok(match (name, numbers) {
+        ("id", Numbers::Real(numbers)) => Values::Long(shared(whole(name, &numbers)?, |&id| id)),
+        ("active" | "trapped", numbers) => {
+            let yes = numbers.into_reals().into_iter().map(|value| value != 0.0).collect();
+            Values::Bool(shared(yes, |&yes| yes))
+        }
+        (_, Numbers::Real(numbers)) => {
+            let floats = numbers.into_iter().map(|value| value as f32).collect();
+            Values::Float(shared(floats, |value| value.to_bits()))
+        }
+        (_, Numbers::Whole(numbers)) if name != "id" && fits_int => {
+            let whole = numbers.into_iter().map(|value| value as i32).collect();
+            Values::Int(shared(whole, |&value| value))
+        }
+        (_, Numbers::Whole(numbers)) => Values::Long(shared(numbers, |&value| value)),
+    })
+}
+
 /// Numbers as 64-bit integers.
-pub(super) fn whole(name: &str, column: &[f64]) -> std::result::Result<Vec<i64>, String> {
+fn whole(name: &str, column: &[f64]) -> std::result::Result<Vec<i64>, String> {
     let exact = |(row, &value): (usize, &f64)| {
         let is_whole = value.fract() == 0.0 && value.abs() <= (1u64 << 53) as f64;
         is_whole
@@ -303,7 +312,7 @@ pub(super) fn whole(name: &str, column: &[f64]) -> std::result::Result<Vec<i64>,
 }
 
 /// A single value if all have the same key.
-pub(super) fn shared<T: Copy, K: PartialEq>(values: Vec<T>, key: impl Fn(&T) -> K) -> Column<T> {
+fn shared<T: Copy, K: PartialEq>(values: Vec<T>, key: impl Fn(&T) -> K) -> Column<T> {
     match values.first() {
         Some(first) if values.len() > 1 && values.iter().all(|value| key(value) == key(first)) => {
             Column::Uniform(*first)

@@ -7,11 +7,12 @@
 use std::io::Write;
 use std::path::Path;
 
-use super::{ParticleData, shared, whole};
+use super::{ParticleData, scalars, vectors, whole};
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::geometry::mesh::spacing;
 use crate::geometry::points::{Attribute, Points, Values};
+use crate::io::files::numbers::Numbers;
 use crate::io::files::{atomic, source};
 use crate::io::mesh::ply;
 use crate::io::mesh::ply::Element;
@@ -91,28 +92,21 @@ fn attributes(
             continue;
         }
         let column = &columns[n];
-        let (name, values) = match (of_vector('x'), name.as_str()) {
-            (Some((stem, axes)), _) => {
+        let (name, values) = match of_vector('x') {
+            Some((stem, axes)) => {
                 let vector = |row: usize| axes.map(|axis| columns[axis][row] as f32);
-                (
-                    stem,
-                    Values::Vector(shared((0..column.len()).map(vector).collect(), |v| v.map(f32::to_bits))),
-                )
+                (stem, vectors((0..column.len()).map(vector)))
             }
-            (None, "id") => (name.as_str(), Values::Long(shared(whole(name, column)?, |&id| id))),
-            (None, "active" | "trapped") => {
-                let yes = column.iter().map(|&value| value != 0.0).collect();
-                (name.as_str(), Values::Bool(shared(yes, |&yes| yes)))
+            None => {
+                let is_real = property.is_float() || ["id", "active", "trapped"].contains(&&**name);
+                let numbers = if is_real {
+                    Numbers::Real(column.clone())
+                } else {
+                    Numbers::Whole(whole(name, column)?)
+                };
+                let fits_int = column.iter().all(|&value| f64::from(value as i32) == value);
+                (&**name, scalars(name, numbers, fits_int)?)
             }
-            _ if property.is_float() => {
-                let floats = column.iter().map(|&value| value as f32).collect();
-                (name.as_str(), Values::Float(shared(floats, |value| value.to_bits())))
-            }
-            _ if column.iter().all(|&value| f64::from(value as i32) == value) => {
-                let whole = column.iter().map(|&value| value as i32).collect();
-                (name.as_str(), Values::Int(shared(whole, |&value| value)))
-            }
-            _ => (name.as_str(), Values::Long(shared(whole(name, column)?, |&value| value))),
         };
         out.push(Attribute { name: name.to_string(), values });
     }

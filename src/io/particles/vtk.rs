@@ -351,9 +351,7 @@ impl<'a> Reader<'a> {
             return Ok(out);
         }
         for n in 0..count {
-            if n.is_multiple_of(PIECE) && source::is_stopped() {
-                return Err("stopped".into());
-            }
+            source::go_on(n, PIECE)?;
             kind.read_word(self.word()?, &mut out)?;
         }
         Ok(out)

@@ -55,9 +55,7 @@ impl<'a> File<'a> {
     ) -> Result<Numbers, String> {
         let mut out = kind.none();
         for (n, word) in words.enumerate() {
-            if n.is_multiple_of(PIECE) && source::is_stopped() {
-                return Err("stopped".into());
-            }
+            source::go_on(n, PIECE)?;
             kind.read_word(word.as_bytes(), &mut out)?;
         }
         if out.count() == count { Ok(out) } else { Err(other_size(out.count(), "numbers", count)) }
@@ -110,9 +108,7 @@ impl<'a> File<'a> {
         let packed = (0..blocks).map(|_| self.head(stream)).collect::<Result<Vec<_>, _>>()?;
         let mut out = Vec::new();
         for (block, packed) in packed.into_iter().enumerate() {
-            if source::is_stopped() {
-                return Err("stopped".into());
-            }
+            source::go_on(0, 1)?;
             let (packed, size) = (stream.take(packed)?, of_block(block));
             // A size that the bytes cannot decompress to must not cause an allocation.
             let inflated = Some(size).filter(|&size| size as u64 <= most_inflated(packed.len()));

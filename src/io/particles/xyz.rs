@@ -56,9 +56,7 @@ fn parse_text(bytes: &[u8]) -> Result<ParticleColumns, String> {
     let mut commas = bytes.contains(&b',').then(Commas::default);
     let mut points = Vec::new();
     for (n, line) in text::lines(bytes) {
-        if n.is_multiple_of(PIECE) && source::is_stopped() {
-            return Err("stopped".into());
-        }
+        source::go_on(n, PIECE)?;
         let line = line.trim_ascii();
         if line.is_empty() || line.starts_with(b"#") {
             continue;

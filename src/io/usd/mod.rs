@@ -12,7 +12,8 @@ pub use text::prim_name;
 use materials::Look;
 
 use crate::geometry::mesh::attributes::Number;
-use crate::geometry::{DVec3, MeshArray, Points, Uvs, Vec3};
+use crate::geometry::{DVec3, MeshArray, Points, TriMesh, Uvs, Vec3};
+use crate::io::mesh::Carried;
 use primvars::Primvar;
 
 /// A moving mesh at one frame.
@@ -31,10 +32,18 @@ pub struct MeshFrame<'a> {
     pub arrays: &'a [&'a MeshArray],
 }
 
+impl<'a> MeshFrame<'a> {
+    /// A mesh with what it carries.
+    pub fn of(name: &'a str, mesh: &'a TriMesh, carried: &Carried<'a>) -> Self {
+        let Carried { velocities, uvs, arrays } = *carried;
+        Self { name, points: &mesh.positions, velocities, triangles: &mesh.triangles, uvs, arrays }
+    }
+}
+
 /// The part of a moving mesh that does not change from frame to frame.
 pub struct MeshPrim<'a> {
     /// Name of its prim: see [`prim_name`].
-    pub name: &'a str,
+    pub name: String,
     /// Its material.
     pub look: Look,
     /// Whether its frames have velocities; a mesh that is another one at each frame has none.
@@ -42,19 +51,19 @@ pub struct MeshPrim<'a> {
     /// The texture coordinates of its frames, if any.
     pub uvs: Option<&'a Uvs>,
     /// The primvars of its frames.
-    pub primvars: &'a [Primvar],
+    pub primvars: Vec<Primvar>,
 }
 
 /// A volume with its .vdb files.
-pub struct VolumeFiles<'a> {
+pub struct VolumeFiles {
     /// Name of its prim.
-    pub name: &'a str,
+    pub name: &'static str,
     /// Its fields, each a grid of the files.
-    pub fields: &'a [Field],
+    pub fields: &'static [Field],
     /// Whether it is for viewing only and not to be rendered.
     pub is_guide: bool,
     /// Frames with their files, relative to the .usda file.
-    pub files: &'a [(i32, String)],
+    pub files: Vec<(i32, String)>,
 }
 
 /// A field of a volume.
@@ -156,7 +165,7 @@ pub fn stage(comment: &str, time: StageTime, volumes: &[VolumeFiles], clips: &[C
     out
 }
 
-impl VolumeFiles<'_> {
+impl VolumeFiles {
     /// Its material; none if none of its fields is a distance or a density, because there is nothing to see.
     fn look(&self) -> Option<Look> {
         self.fields.iter().find_map(|field| match field.holds {
@@ -195,7 +204,7 @@ fn write_volume(out: &mut String, volume: &VolumeFiles) {
             "\n        def OpenVDBAsset \"{grid}\"\n        {{\n            token fieldName = \"{grid}\"\n            \
              token fieldDataType = \"{numbers}\"{class}\n            asset filePath.timeSamples = {{\n"
         );
-        for (frame, file) in volume.files {
+        for (frame, file) in &volume.files {
             let _ = writeln!(out, "                {frame}: {},", asset(file));
         }
         out.push_str("            }\n        }\n");
@@ -218,10 +227,15 @@ pub enum ClipPrims<'a> {
     /// Moving meshes, under a prim of the kind's name.
     Meshes(Vec<MeshPrim<'a>>),
     /// A prim of points with the kind's name, as [`points::frame`] writes it; these points have its attributes.
-    Points(&'a Points),
+    Points(Points),
 }
 
-impl Clips<'_> {
+impl<'a> Clips<'a> {
+    /// No frames yet.
+    pub fn new(kind: &'static str, prims: ClipPrims<'a>) -> Self {
+        Self { kind, frames: Vec::new(), prims }
+    }
+
     /// The materials of its prims.
     fn looks(&self) -> Vec<Look> {
         match &self.prims {

@@ -2,9 +2,8 @@
 
 use std::fmt::Write;
 
-use super::primvars;
 use super::primvars::unique;
-use super::{Units, list, prim_name, quoted, vector};
+use super::{Units, list, prim_name, primvars, quoted, vector};
 use crate::geometry::mesh::attributes::Number;
 use crate::geometry::points::{Attribute, Column, Points, Values};
 use crate::geometry::{DVec3, Vec3};

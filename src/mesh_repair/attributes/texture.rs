@@ -10,6 +10,7 @@
 
 use super::charts::{Chart, Charts, longest};
 use super::weights::{Weights, between};
+use crate::geometry::mesh::{drop_marked, renumber_kept};
 use crate::geometry::{TriMesh, Uvs};
 
 /// A coordinate, or a difference of two.
@@ -97,17 +98,10 @@ pub(in crate::mesh_repair) fn textured(
 /// Removes coordinates that no corner uses, except those of the first mesh.
 fn tidy(uvs: &mut Uvs, first: usize) {
     let Some(corners) = &mut uvs.corners else { return };
-    let mut is_used: Vec<bool> = (0..uvs.coordinates.len()).map(|at| at < first).collect();
-    corners.iter().for_each(|corner| is_used[*corner as usize] = true);
-    let mut next = 0;
-    let number = |is_used: &bool| {
-        next += u32::from(*is_used);
-        next - u32::from(*is_used)
-    };
-    let numbers: Vec<u32> = is_used.iter().map(number).collect();
-    corners.iter_mut().for_each(|corner| *corner = numbers[*corner as usize]);
-    let mut marks = is_used.iter();
-    uvs.coordinates.retain(|_| marks.next().copied().unwrap_or_default());
+    let mut is_unused: Vec<bool> = (0..uvs.coordinates.len()).map(|at| at >= first).collect();
+    corners.iter().for_each(|corner| is_unused[*corner as usize] = false);
+    renumber_kept(corners, &is_unused);
+    drop_marked(&mut uvs.coordinates, &is_unused);
 }
 
 /// Where a corner of a charted triangle takes its coordinate from.

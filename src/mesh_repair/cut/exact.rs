@@ -6,8 +6,7 @@
 
 use crate::distance::lattice::{Fixed, UNITS};
 use crate::distance::winding::{Axis, passes_left};
-use crate::geometry::Coord;
-use crate::geometry::DVec3;
+use crate::geometry::{Coord, DVec3};
 
 /// An edge of the grid: its axis and its lower node.
 pub type GridEdge = (usize, Coord);

@@ -16,8 +16,8 @@ use pierces::Pierces;
 
 use super::region::CellSet;
 use crate::distance::lattice::Fixed;
-use crate::geometry::Coord;
-use crate::geometry::DVec3;
+use crate::geometry::coords::between;
+use crate::geometry::{Coord, DVec3};
 
 /// Triangles per task.
 const GRAIN: usize = 1024;
@@ -80,7 +80,10 @@ impl Shape {
     pub fn cells_of(&self, triangle: u32) -> Vec<Coord> {
         let mut cells = match self.traced(triangle) {
             Some(traced) => cells(&traced),
-            None => box_of(self.corners(triangle)),
+            None => {
+                let (low, high) = bounds(self.corners(triangle));
+                between(low, high).collect()
+            }
         };
         cells.sort_unstable();
         cells.dedup();
@@ -125,8 +128,7 @@ impl Shape {
         let (low, high) = bounds(self.corners(triangle));
         let size = (0..3).map(|axis| i64::from(high[axis] - low[axis]) + 1).product::<i64>();
         if size <= FEW {
-            let mut held = 0;
-            each(low, high, |cell| held += i64::from(set.holds(cell)));
+            let held = between(low, high).filter(|cell| set.holds(*cell)).count() as i64;
             if held == 0 {
                 out.whole.push(triangle);
             }
@@ -218,19 +220,4 @@ fn bounds(corners: [Fixed; 3]) -> (Coord, Coord) {
     let cells = corners.map(exact::cell_of);
     let of = |pick: fn(i32, i32) -> i32| [0, 1, 2].map(|a| pick(pick(cells[0][a], cells[1][a]), cells[2][a]));
     (of(i32::min), of(i32::max))
-}
-
-fn each(low: Coord, high: Coord, mut see: impl FnMut(Coord)) {
-    for x in low[0]..=high[0] {
-        for y in low[1]..=high[1] {
-            (low[2]..=high[2]).for_each(|z| see([x, y, z]));
-        }
-    }
-}
-
-fn box_of(corners: [Fixed; 3]) -> Vec<Coord> {
-    let (low, high) = bounds(corners);
-    let mut out = Vec::new();
-    each(low, high, |cell| out.push(cell));
-    out
 }

@@ -7,6 +7,7 @@ use crate::distance::Face;
 use crate::distance::lattice::Fixed;
 use crate::distance::winding::{Axis, each_crossing};
 use crate::geometry::Coord;
+use crate::geometry::lists::Lists;
 
 /// Triangles per task.
 const GRAIN: usize = 2048;
@@ -31,9 +32,8 @@ pub struct Pierces {
     /// Keys of edges, ascending; within an edge in order of position.
     keys: Vec<u64>,
     items: Vec<Pierce>,
-    /// `start[t]..start[t + 1]` is the range of triangle t in `edges`, ascending.
-    start: Vec<u32>,
-    edges: Vec<GridEdge>,
+    /// The edges that each triangle passes through, ascending.
+    edges: Lists<GridEdge>,
     /// The winding number behind each pierce along z, on its line; these pierces are the last ones.
     behind: Vec<i32>,
 }
@@ -62,13 +62,9 @@ impl Pierces {
                 out
             })
             .collect();
-        let mut start = vec![0u32; triangles.len() + 1];
-        parts.iter().flatten().for_each(|(triangle, ..)| start[*triangle as usize + 1] += 1);
-        (0..triangles.len()).for_each(|triangle| start[triangle + 1] += start[triangle]);
-        let mut edges: Vec<GridEdge> = parts.iter().flatten().map(|(_, edge, _)| *edge).collect();
-        for ends in start.windows(2).filter(|ends| ends[1] > ends[0] + 1) {
-            edges[ends[0] as usize..ends[1] as usize].sort_unstable();
-        }
+        let by_triangle = parts.iter().flatten().map(|(triangle, edge, _)| (*triangle, *edge));
+        let mut edges = Lists::new(triangles.len(), by_triangle);
+        edges.each_mut(|edges| edges.sort_unstable());
         let mut items: Vec<(u64, Pierce)> =
             parts.into_iter().flatten().map(|(_, edge, pierce)| (key(edge), pierce)).collect();
         items.par_sort_unstable_by(|(k, a), (l, b)| {
@@ -85,7 +81,7 @@ impl Pierces {
             winding
         });
         let behind = behind.collect();
-        Self { keys, items, start, edges, behind }
+        Self { keys, items, edges, behind }
     }
 
     /// The passages through an edge of the grid.
@@ -98,8 +94,7 @@ impl Pierces {
 
     /// The edges of the grid that a triangle passes through, ascending.
     pub fn of_triangle(&self, triangle: u32) -> &[GridEdge] {
-        let at = triangle as usize;
-        &self.edges[self.start[at] as usize..self.start[at + 1] as usize]
+        self.edges.get(triangle as usize)
     }
 
     /// Winding number at a node.
@@ -116,7 +111,7 @@ impl Pierces {
 
     /// All edges of the grid that the mesh passes through, by triangle.
     pub fn edges(&self) -> &[GridEdge] {
-        &self.edges
+        self.edges.items()
     }
 }
 

@@ -2,9 +2,8 @@
 
 use super::exact::Point;
 use super::{Half, Shape};
-use crate::geometry::triangulate::ear_clipping;
 use crate::geometry::triangulate::ear_clipping::turn;
-use crate::geometry::triangulate::monotone;
+use crate::geometry::triangulate::{ear_clipping, monotone};
 
 /// Maximum number of corners of a polygon that is triangulated by ear clipping.
 const FEW_CORNERS: usize = 200;

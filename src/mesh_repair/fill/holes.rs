@@ -6,9 +6,10 @@
 use std::collections::BTreeSet;
 use std::iter::repeat_n;
 
+use crate::geometry::check::duplicates::rotated;
 use crate::geometry::check::edges::{Use, is_same_edge, runs, sides};
 use crate::geometry::{DVec3, PolygonMesh, Vec3};
-use crate::mesh_repair::prepare::{Closed, rotated};
+use crate::mesh_repair::prepare::Closed;
 
 /// Maximum number of corners of a ring that is triangulated between its corners: larger ones take too long.
 const MOST_CORNERS: usize = 500;
@@ -20,25 +21,25 @@ const WAYS: usize = 8;
 /// Closes the holes of triangles with these edges, so that along every edge as many triangles run in one direction as in the other. A ring
 /// of three around which a triangle already runs in the other direction is no hole: that triangle is left out.
 pub(in crate::mesh_repair) fn close(closed: &mut Closed, uses: &[Use]) {
-    let rings = rings(closed.positions.len(), lacking(&closed.triangles, uses));
-    let mut is_out = vec![false; closed.triangles.len()];
+    let rings = rings(closed.mesh.positions.len(), lacking(&closed.mesh.triangles, uses));
+    let mut is_out = vec![false; closed.mesh.triangles.len()];
     let mut made = BTreeSet::new();
     for ring in rings {
         let caps = if let [a, b, c] = ring[..] {
-            if let Some(opposite) = find(uses, &closed.triangles, [a, c, b], &is_out) {
+            if let Some(opposite) = find(uses, &closed.mesh.triangles, [a, c, b], &is_out) {
                 is_out[opposite as usize] = true;
                 continue;
             }
             vec![[a, b, c]]
-        } else if let Some(caps) = cut(&closed.positions, &ring, uses, &made) {
+        } else if let Some(caps) = cut(&closed.mesh.positions, &ring, uses, &made) {
             made.extend(caps.iter().flat_map(sides));
             caps
         } else {
-            fan(&mut closed.positions, &ring)
+            fan(&mut closed.mesh.positions, &ring)
         };
         closed.prepared.holes += 1;
         closed.sources.extend(repeat_n(None, caps.len()));
-        closed.triangles.extend(caps);
+        closed.mesh.triangles.extend(caps);
     }
     closed.leave_out(&is_out);
 }

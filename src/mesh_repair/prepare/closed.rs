@@ -1,17 +1,17 @@
 //! Triangles that are closed as a chain, and what was done to close them.
 
 use crate::geometry::check::edges::{Use, agree};
+use crate::geometry::mesh::drop_marked;
 use crate::geometry::mesh::weld::Weld;
-use crate::geometry::{DVec3, Vec3};
+use crate::geometry::shape::six_volumes;
+use crate::geometry::{DVec3, TriMesh};
 
 /// Triangles that are closed as a chain and turned outward: along every edge as many run in one direction as in the other.
 #[derive(Debug)]
 pub(in crate::mesh_repair) struct Closed {
-    /// Positions (m): all of the mesh's own vertices first, in their order, then those that close holes.
-    pub positions: Vec<Vec3>,
-    /// The mesh's triangles first, in their order, then those that close holes. A triangle that was turned round keeps its
-    /// first corner.
-    pub triangles: Vec<[u32; 3]>,
+    /// All of the input's vertices first, in their order, then those that close holes; triangles likewise. A triangle that was turned
+    /// round keeps its first corner.
+    pub mesh: TriMesh,
     /// The triangle of the mesh that each one was; none if it closes a hole.
     pub sources: Vec<Option<u32>>,
     /// What was done.
@@ -21,15 +21,15 @@ pub(in crate::mesh_repair) struct Closed {
 impl Closed {
     /// Joins coinciding vertices among those of triangles that are not sound: each takes the index of the first.
     pub fn join(&mut self, is_sound: &[bool]) {
-        let mut is_named = vec![false; self.positions.len()];
-        for (triangle, _) in self.triangles.iter().zip(is_sound).filter(|(_, sound)| !**sound) {
+        let mut is_named = vec![false; self.mesh.positions.len()];
+        for (triangle, _) in self.mesh.triangles.iter().zip(is_sound).filter(|(_, sound)| !**sound) {
             triangle.iter().for_each(|&vertex| is_named[vertex as usize] = true);
         }
-        let mut names: Vec<u32> = (0..self.positions.len() as u32).collect();
+        let mut names: Vec<u32> = (0..self.mesh.positions.len() as u32).collect();
         let named: Vec<u32> = names.iter().copied().filter(|&vertex| is_named[vertex as usize]).collect();
         let positions: Vec<DVec3> =
-            named.iter().map(|&vertex| self.positions[vertex as usize].cast()).collect();
-        let unsound = self.triangles.iter().zip(is_sound).filter(|(_, sound)| !**sound);
+            named.iter().map(|&vertex| self.mesh.positions[vertex as usize].cast()).collect();
+        let unsound = self.mesh.triangles.iter().zip(is_sound).filter(|(_, sound)| !**sound);
         let number = |vertex: u32| named.partition_point(|other| *other < vertex) as u32;
         let triangles: Vec<[u32; 3]> = unsound.map(|(triangle, _)| triangle.map(number)).collect();
         let weld = Weld::of(&positions, &triangles);
@@ -38,7 +38,7 @@ impl Closed {
             names[vertex as usize] = named[first as usize];
             self.prepared.joined_vertices += usize::from(names[vertex as usize] != vertex);
         }
-        for (triangle, _) in self.triangles.iter_mut().zip(is_sound).filter(|(_, sound)| !**sound) {
+        for (triangle, _) in self.mesh.triangles.iter_mut().zip(is_sound).filter(|(_, sound)| !**sound) {
             *triangle = triangle.map(|vertex| names[vertex as usize]);
         }
     }
@@ -46,11 +46,11 @@ impl Closed {
     /// Turns triangles round so that two that share an edge with no third agree.
     pub fn make_agree(&mut self, uses: &[Use]) {
         let area = |at: usize| {
-            let [a, b, c] = corners(&self.positions, &self.triangles[at]);
+            let [a, b, c] = self.mesh.corners(at);
             (b - a).cross(&(c - a)).norm()
         };
-        let turned = agree(&self.triangles, uses, area).turned;
-        for (triangle, _) in self.triangles.iter_mut().zip(&turned).filter(|(_, turned)| **turned) {
+        let turned = agree(&self.mesh.triangles, uses, area).turned;
+        for (triangle, _) in self.mesh.triangles.iter_mut().zip(&turned).filter(|(_, turned)| **turned) {
             triangle.swap(1, 2);
             self.prepared.turned_triangles += 1;
         }
@@ -62,22 +62,19 @@ impl Closed {
         if count == 0 {
             return;
         }
-        let mut marks = is_out.iter();
-        self.triangles.retain(|_| marks.next() != Some(&true));
-        let mut marks = is_out.iter();
-        self.sources.retain(|_| marks.next() != Some(&true));
+        drop_marked(&mut self.mesh.triangles, is_out);
+        drop_marked(&mut self.sources, is_out);
         self.prepared.dropped_triangles += count;
     }
 
     /// Turns parts of negative volume round.
     pub fn turn_outward(&mut self, parts: &[u32]) {
         let mut six = vec![0.0f64; parts.len()];
-        for (triangle, &part) in self.triangles.iter().zip(parts) {
-            let origin: DVec3 = self.positions[self.triangles[part as usize][0] as usize].cast();
-            let [a, b, c] = corners(&self.positions, triangle).map(|position| position - origin);
-            six[part as usize] += a.dot(&b.cross(&c));
+        for (triangle, &part) in parts.iter().enumerate() {
+            let [origin, ..] = self.mesh.corners(part as usize);
+            six[part as usize] += six_volumes(&self.mesh.corners(triangle), &origin);
         }
-        for (triangle, &part) in self.triangles.iter_mut().zip(parts) {
+        for (triangle, &part) in self.mesh.triangles.iter_mut().zip(parts) {
             if six[part as usize] < 0.0 {
                 triangle.swap(1, 2);
             }
@@ -103,8 +100,4 @@ pub struct Prepared {
     pub holes: usize,
     /// Triangles that close them.
     pub added_triangles: usize,
-}
-
-pub(in crate::mesh_repair::prepare) fn corners(positions: &[Vec3], triangle: &[u32; 3]) -> [DVec3; 3] {
-    triangle.map(|vertex| positions[vertex as usize].cast())
 }

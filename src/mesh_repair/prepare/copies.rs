@@ -1,21 +1,14 @@
 //! Triangles and parts that lie on others.
 
-use rayon::prelude::*;
-
 use crate::geometry::Vec3;
-use crate::geometry::check::duplicates;
+use crate::geometry::check::duplicates::{self, by_vertices, rotated};
 use crate::geometry::check::edges::{edge_uses, imbalance, is_same_edge, parts_of};
 
 /// Which triangles have the same vertices as others and are removed. Of those with the same orientation the first stays. If two have
 /// opposite orientations none stays: they are a sheet folded onto itself, which encloses nothing. But where such sheets are closed
 /// themselves, the first ones stay: a solid of whose faces both sides were given.
 pub(in crate::mesh_repair) fn doubled(vertices: usize, triangles: &[[u32; 3]]) -> Vec<bool> {
-    let by_vertices = |(triangle, number): (&[u32; 3], u32)| {
-        let [a, b, c] = rotated(*triangle);
-        ([a, b.min(c), b.max(c)], number, b < c)
-    };
-    let mut order: Vec<([u32; 3], u32, bool)> = triangles.iter().zip(0..).map(by_vertices).collect();
-    order.par_sort_unstable();
+    let order = by_vertices(triangles);
     let mut is_out = vec![false; triangles.len()];
     let mut folded = Vec::new();
     for same in order.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() > 1) {
@@ -57,9 +50,4 @@ pub(in crate::mesh_repair) fn copies(positions: &[Vec3], triangles: &[[u32; 3]],
         [p.x + 0.0, p.y + 0.0, p.z + 0.0].map(f32::to_bits)
     };
     duplicates::copies(parts, |_| true, |triangle| rotated(triangles[triangle].map(position)))
-}
-
-/// Corners of a triangle, starting with the smallest, so that triangles of the same orientation compare equal.
-pub(in crate::mesh_repair) fn rotated<T: Ord + Copy>([a, b, c]: [T; 3]) -> [T; 3] {
-    [a, b, c].min([b, c, a]).min([c, a, b])
 }

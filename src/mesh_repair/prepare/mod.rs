@@ -8,7 +8,6 @@ pub(in crate::mesh_repair) mod copies;
 
 pub(super) use closed::Closed;
 pub use closed::Prepared;
-pub(super) use copies::rotated;
 use rayon::prelude::*;
 
 use super::fill::holes::close;
@@ -29,8 +28,7 @@ const GRAIN: usize = 2048;
 pub(super) fn prepare(mesh: &TriMesh) -> Closed {
     let vertices = mesh.positions.len();
     let mut closed = Closed {
-        positions: mesh.positions.clone(),
-        triangles: mesh.triangles.clone(),
+        mesh: mesh.clone(),
         sources: (0..mesh.triangles.len() as u32).map(Some).collect(),
         prepared: Prepared::default(),
     };
@@ -39,22 +37,23 @@ pub(super) fn prepare(mesh: &TriMesh) -> Closed {
     let is_sound = sound(&mesh.triangles, &uses, &parts);
     if is_sound.contains(&false) {
         closed.join(&is_sound);
-        closed.leave_out(&collapsed(&closed.triangles));
-        let is_out = doubled(vertices, &closed.triangles);
+        closed.leave_out(&collapsed(&closed.mesh.triangles));
+        let is_out = doubled(vertices, &closed.mesh.triangles);
         // Solids that nearly coincide share some triangles: if everything is closed as it is, it stays closed.
-        if !is_balanced(vertices, &closed.triangles, &[]) || is_balanced(vertices, &closed.triangles, &is_out)
+        if !is_balanced(vertices, &closed.mesh.triangles, &[])
+            || is_balanced(vertices, &closed.mesh.triangles, &is_out)
         {
             closed.leave_out(&is_out);
         }
-        closed.leave_out(&loose_needles(&closed.positions, &closed.triangles));
-        let uses = edge_uses(vertices, &closed.triangles);
+        closed.leave_out(&loose_needles(&closed.mesh.positions, &closed.mesh.triangles));
+        let uses = edge_uses(vertices, &closed.mesh.triangles);
         closed.make_agree(&uses);
         close(&mut closed, &uses);
-        let uses = edge_uses(closed.positions.len(), &closed.triangles);
-        parts = parts_of(closed.triangles.len(), &uses);
+        let uses = edge_uses(closed.mesh.positions.len(), &closed.mesh.triangles);
+        parts = parts_of(closed.mesh.triangles.len(), &uses);
     }
     closed.turn_outward(&parts);
-    closed.leave_out(&copies(&closed.positions, &closed.triangles, &parts));
+    closed.leave_out(&copies(&closed.mesh.positions, &closed.mesh.triangles, &parts));
     closed.prepared.added_triangles = closed.sources.iter().filter(|source| source.is_none()).count();
     closed
 }
@@ -108,14 +107,13 @@ pub(super) mod tests {
 
     /// Prepares a mesh and checks what holds for any; returns the result and how it was prepared.
     pub fn checked(mesh: &TriMesh) -> (TriMesh, Prepared) {
-        let Closed { positions, triangles, sources, prepared } = prepare(mesh);
-        assert!(positions.starts_with(&mesh.positions));
-        assert_eq!(sources.len(), triangles.len());
+        let Closed { mesh: out, sources, prepared } = prepare(mesh);
+        assert!(out.positions.starts_with(&mesh.positions));
+        assert_eq!(sources.len(), out.triangles.len());
         let own: Vec<u32> = sources.iter().copied().flatten().collect();
         assert!(own.is_sorted_by(|a, b| a < b));
         assert_eq!(own.len() + prepared.dropped_triangles, mesh.triangles.len());
-        assert_eq!(triangles.len() - own.len(), prepared.added_triangles);
-        let out = TriMesh { positions, triangles };
+        assert_eq!(out.triangles.len() - own.len(), prepared.added_triangles);
         assert!(out.is_closed());
         (out, prepared)
     }

@@ -5,10 +5,10 @@ use std::collections::HashMap;
 use super::CellSet;
 use crate::context::Context;
 use crate::error::Result;
-use crate::geometry::Coord;
 use crate::geometry::check::faults::meeting_pairs;
 use crate::geometry::check::topology::{bodies, faulty};
-use crate::geometry::{DVec3, TriMesh};
+use crate::geometry::coords::nodes_of;
+use crate::geometry::{Coord, DVec3};
 use crate::mesh_repair::cut::Shape;
 use crate::mesh_repair::cut::exact::{around, beside, cell_of, passages};
 use crate::mesh_repair::prepare::Closed;
@@ -25,10 +25,9 @@ const THINNEST: f64 = 4e-4;
 /// Cancel.
 pub fn flagged(ctx: &Context, closed: &Closed, shape: &Shape) -> Result<CellSet> {
     let mut set = CellSet::default();
-    let mesh = TriMesh { positions: closed.positions.clone(), triangles: closed.triangles.clone() };
     // A large triangle intersects many small ones: its cells are kept.
     let mut known: HashMap<u32, Vec<Coord>> = HashMap::new();
-    for [first, second] in meeting_pairs(&mesh) {
+    for [first, second] in meeting_pairs(&closed.mesh) {
         ctx.check()?;
         for triangle in [first, second] {
             known.entry(triangle).or_insert_with(|| shape.cells_of(triangle));
@@ -53,7 +52,7 @@ pub fn flagged(ctx: &Context, closed: &Closed, shape: &Shape) -> Result<CellSet>
     overlaps(shape, 0.0, &mut set);
     small(shape, &mut set);
     let caps = (0u32..).zip(&closed.sources).filter(|(_, source)| source.is_none());
-    for (triangle, _) in caps.filter(|(triangle, _)| is_thin(mesh.corners(*triangle as usize))) {
+    for (triangle, _) in caps.filter(|(triangle, _)| is_thin(closed.mesh.corners(*triangle as usize))) {
         shape.cells_of(triangle).into_iter().for_each(|cell| _ = set.add(cell));
     }
     Ok(set)
@@ -92,11 +91,8 @@ fn small(shape: &Shape, set: &mut CellSet) {
             continue;
         }
         let cells: Vec<Coord> = part.iter().flat_map(|triangle| shape.cells_of(*triangle)).collect();
-        let is_outside = |cell: &Coord| {
-            (0..8).all(|n| {
-                shape.pierces.winding([cell[0] + (n >> 2), cell[1] + (n >> 1 & 1), cell[2] + (n & 1)]) == 0
-            })
-        };
+        let is_outside =
+            |cell: &Coord| nodes_of(*cell).into_iter().all(|node| shape.pierces.winding(node) == 0);
         if !cells.iter().all(is_outside) {
             cells.into_iter().for_each(|cell| _ = set.add(cell));
         }

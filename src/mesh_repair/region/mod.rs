@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use super::cut::exact::{GridEdge, around, end};
 use super::cut::pierces::Pierces;
-use crate::geometry::Coord;
+use crate::geometry::{Coord, coords};
 use crate::numeric::blocks::{Mask, origin_of};
 
 /// A set of cells, in blocks of 8 x 8 x 8.
@@ -54,9 +54,7 @@ impl CellSet {
     pub fn with_ring(&self) -> Self {
         let mut out = self.clone();
         for cell in self.iter() {
-            for at in 0..27 {
-                out.add([cell[0] + at / 9 - 1, cell[1] + at / 3 % 3 - 1, cell[2] + at % 3 - 1]);
-            }
+            coords::around(cell).into_iter().for_each(|cell| _ = out.add(cell));
         }
         out
     }

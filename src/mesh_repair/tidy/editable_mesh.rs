@@ -1,8 +1,9 @@
-//! A closed mesh that is changed by edge collapses and flips, with the triangles around its vertices. It stays a closed 2-manifold by index:
-//! two neighbours are merged only if the link condition holds (Dey, Edelsbrunner, Guha and Nekhayev 1999, "Topology preserving edge
-//! contraction"). Vertices and triangles of the input mesh are not touched.
+//! A closed mesh that is changed by edge collapses and flips, with the triangles around its vertices ([`Fans`]). Vertices and triangles of
+//! the input mesh are not touched.
 
 use crate::geometry::DVec3;
+use crate::geometry::fans::{Fans, flipped};
+use crate::geometry::mesh::{drop_marked, renumber_kept};
 use crate::mesh_repair::{Draft, Source};
 
 /// A change of the mesh.
@@ -14,57 +15,27 @@ pub(in crate::mesh_repair) enum Change {
     Flip { triangles: [u32; 2], corners: [u32; 4] },
 }
 
-/// The corners of two triangles after a flip.
-pub(in crate::mesh_repair) fn flipped([a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
-    [[c, a, d], [d, b, c]]
-}
-
-/// For a vertex that no created triangle uses.
-const NONE: u32 = u32::MAX;
-
 /// A mesh with the vertex rings of all vertices that a created triangle uses: all triangles around them, whole ones too.
 pub(in crate::mesh_repair) struct VertexRings<'a> {
     draft: &'a mut Draft,
-    /// For each vertex, the index of its ring; [`NONE`]: it has none.
-    slots: Vec<u32>,
-    /// Triangles of each ring, in no order.
-    rings: Vec<Vec<u32>>,
-    /// For each triangle, whether a collapse has removed it.
-    is_dead: Vec<bool>,
+    fans: Fans,
 }
 
 impl<'a> VertexRings<'a> {
-    /// Takes one pass over all triangles, and memory for those near created ones.
+    /// Takes three passes over all triangles, and memory for those near created ones.
     pub(in crate::mesh_repair) fn of(draft: &'a mut Draft) -> Self {
-        let mut slots = vec![NONE; draft.positions.len()];
-        let mut count = 0;
-        for (corners, source) in draft.triangles.iter().zip(&draft.sources) {
-            if matches!(source, Source::Whole(_)) {
-                continue;
-            }
-            for corner in corners {
-                let slot = &mut slots[*corner as usize];
-                if *slot == NONE {
-                    *slot = count;
-                    count += 1;
-                }
-            }
+        let mut is_used = vec![false; draft.positions.len()];
+        let created = draft.triangles.iter().zip(&draft.sources);
+        for (corners, _) in created.filter(|(_, source)| !matches!(source, Source::Whole(_))) {
+            corners.iter().for_each(|corner| is_used[*corner as usize] = true);
         }
-        let mut rings: Vec<Vec<u32>> = vec![Vec::new(); count as usize];
-        for (triangle, corners) in (0..).zip(&draft.triangles) {
-            for corner in corners {
-                if let Some(fan) = rings.get_mut(slots[*corner as usize] as usize) {
-                    fan.push(triangle);
-                }
-            }
-        }
-        let is_dead = vec![false; draft.triangles.len()];
-        Self { draft, slots, rings, is_dead }
+        let fans = Fans::of(is_used.len(), &draft.triangles, |vertex| is_used[vertex as usize]);
+        Self { draft, fans }
     }
 
     /// Whether a triangle exists, and was made or changed by the repair; whole ones stay as they are.
     pub(in crate::mesh_repair) fn is_created(&self, triangle: u32) -> bool {
-        !self.is_dead[triangle as usize] && !matches!(self.source(triangle), Source::Whole(_))
+        !self.fans.are_dead()[triangle as usize] && !matches!(self.source(triangle), Source::Whole(_))
     }
 
     /// Vertices of a triangle.
@@ -85,24 +56,6 @@ impl<'a> VertexRings<'a> {
         self.draft.is_made[vertex as usize]
     }
 
-    /// The triangles around a vertex; empty if no created triangle used it.
-    fn around(&self, vertex: u32) -> &[u32] {
-        self.rings.get(self.slots[vertex as usize] as usize).map(Vec::as_slice).unwrap_or_default()
-    }
-
-    fn around_mut(&mut self, vertex: u32) -> Option<&mut Vec<u32>> {
-        self.rings.get_mut(self.slots[vertex as usize] as usize)
-    }
-
-    /// The neighbours of a vertex, ascending.
-    fn ring(&self, vertex: u32) -> Vec<u32> {
-        let corners = self.around(vertex).iter().flat_map(|&triangle| self.corners(triangle));
-        let mut ring: Vec<u32> = corners.filter(|&corner| corner != vertex).collect();
-        ring.sort_unstable();
-        ring.dedup();
-        ring
-    }
-
     /// Collapses and flips of a triangle's edges that keep the mesh a closed 2-manifold, wherever its vertices lie.
     pub(in crate::mesh_repair) fn changes(&self, triangle: u32) -> Vec<Change> {
         let corners = self.corners(triangle);
@@ -110,7 +63,7 @@ impl<'a> VertexRings<'a> {
         for first in 0..3 {
             let [a, b, c] = [0, 1, 2].map(|n| corners[(first + n) % 3]);
             let [a_is_made, b_is_made] = [a, b].map(|vertex| self.is_made(vertex));
-            if (a_is_made || b_is_made) && self.may_join(a, b) {
+            if (a_is_made || b_is_made) && self.fans.may_join(&self.draft.triangles, a, b) {
                 let [at_a, at_b] = [a, b].map(|vertex| self.position(vertex));
                 if a_is_made {
                     out.push(Change::Collapse { from: a, to: b, position: at_b });
@@ -127,20 +80,12 @@ impl<'a> VertexRings<'a> {
         out
     }
 
-    /// Whether two neighbours may be merged: their only common neighbours are the two corners opposite their edge, and these, which lose a
-    /// triangle each, keep three. That also preserves tetrahedra.
-    fn may_join(&self, a: u32, b: u32) -> bool {
-        let [mut shared, other] = [a, b].map(|vertex| self.ring(vertex));
-        shared.retain(|vertex| other.binary_search(vertex).is_ok());
-        shared.len() == 2 && shared.iter().all(|&corner| self.around(corner).len() > 3)
-    }
-
     /// The flip of the edge from a triangle's corner a to b; none if the triangle beyond it is whole, or the new edge exists already.
     fn flip(&self, triangle: u32, [a, b, c]: [u32; 3]) -> Option<Change> {
-        let mut fan = self.around(a).iter().copied();
+        let mut fan = self.fans.around(a).iter().copied();
         let beyond = fan.find(|&other| other != triangle && self.corners(other).contains(&b))?;
         let d = self.corners(beyond).into_iter().find(|&corner| corner != a && corner != b)?;
-        let is_there = self.around(c).iter().any(|&other| self.corners(other).contains(&d));
+        let is_there = self.fans.are_neighbours(&self.draft.triangles, c, d);
         let may_flip = self.is_created(triangle) && self.is_created(beyond) && !is_there;
         may_flip.then_some(Change::Flip { triangles: [triangle, beyond], corners: [a, b, c, d] })
     }
@@ -152,9 +97,7 @@ impl<'a> VertexRings<'a> {
         to: u32,
         position: DVec3,
     ) -> impl Iterator<Item = u32> {
-        let around: &[u32] = if position == self.position(to) { &[] } else { self.around(to) };
-        let others = around.iter().filter(move |&&triangle| !self.corners(triangle).contains(&from));
-        self.around(from).iter().chain(others).copied()
+        self.fans.moving(&self.draft.triangles, [from, to], position != self.position(to))
     }
 
     /// Whether triangles are parts of the same triangle.
@@ -168,17 +111,15 @@ impl<'a> VertexRings<'a> {
     pub(in crate::mesh_repair) fn make(&mut self, change: Change) -> Vec<u32> {
         match change {
             Change::Collapse { from, to, position } => self.collapse(from, to, position),
-            Change::Flip { triangles: [one, two], corners: [a, b, c, d] } => {
-                let source = if self.are_of_one(&[one, two]) { self.source(one) } else { Source::New };
-                for (triangle, corners) in [one, two].into_iter().zip(flipped([a, b, c, d])) {
+            Change::Flip { triangles, corners } => {
+                let source =
+                    if self.are_of_one(&triangles) { self.source(triangles[0]) } else { Source::New };
+                for (triangle, corners) in triangles.into_iter().zip(flipped(corners)) {
                     self.draft.triangles[triangle as usize] = corners;
                     self.draft.sources[triangle as usize] = source;
                 }
-                self.remove(a, two);
-                self.remove(b, one);
-                self.add(c, two);
-                self.add(d, one);
-                vec![one, two]
+                self.fans.flip(triangles, corners);
+                triangles.to_vec()
             }
         }
     }
@@ -191,56 +132,20 @@ impl<'a> VertexRings<'a> {
             moving.iter().for_each(|&triangle| self.draft.sources[triangle as usize] = Source::New);
         }
         self.draft.positions[to as usize] = position;
-        let fan = self.around_mut(from).map(std::mem::take).unwrap_or_default();
-        for triangle in fan {
-            let corners = self.corners(triangle);
-            if corners.contains(&to) {
-                self.is_dead[triangle as usize] = true;
-                corners.into_iter().for_each(|corner| self.remove(corner, triangle));
-            } else {
-                let renamed = corners.map(|corner| if corner == from { to } else { corner });
-                self.draft.triangles[triangle as usize] = renamed;
-                self.add(to, triangle);
-            }
-        }
-        self.around(to).to_vec()
-    }
-
-    fn add(&mut self, vertex: u32, triangle: u32) {
-        if let Some(fan) = self.around_mut(vertex) {
-            fan.push(triangle);
-        }
-    }
-
-    fn remove(&mut self, vertex: u32, triangle: u32) {
-        if let Some(fan) = self.around_mut(vertex) {
-            fan.retain(|&other| other != triangle);
-        }
+        self.fans.collapse(&mut self.draft.triangles, [from, to]);
+        self.fans.around(to).to_vec()
     }
 
     /// Drops removed triangles, and new vertices that no triangle uses. All others keep their order.
     pub(in crate::mesh_repair) fn finish(self) {
-        let (draft, is_dead) = (self.draft, self.is_dead);
-        let alive: Vec<usize> = (0..is_dead.len()).filter(|&triangle| !is_dead[triangle]).collect();
-        draft.triangles = alive.iter().map(|&triangle| draft.triangles[triangle]).collect();
-        draft.sources = alive.iter().map(|&triangle| draft.sources[triangle]).collect();
-        let mut is_named = vec![false; draft.positions.len()];
-        draft.triangles.as_flattened().iter().for_each(|&corner| is_named[corner as usize] = true);
-        let mut numbers = vec![0; is_named.len()];
-        let mut kept = 0;
-        for vertex in 0..is_named.len() {
-            numbers[vertex] = kept as u32;
-            if is_named[vertex] || !draft.is_made[vertex] {
-                draft.positions[kept] = draft.positions[vertex];
-                draft.is_made[kept] = draft.is_made[vertex];
-                kept += 1;
-            }
-        }
-        draft.positions.truncate(kept);
-        draft.is_made.truncate(kept);
-        for corners in &mut draft.triangles {
-            *corners = corners.map(|corner| numbers[corner as usize]);
-        }
+        let Self { draft, fans } = self;
+        drop_marked(&mut draft.triangles, fans.are_dead());
+        drop_marked(&mut draft.sources, fans.are_dead());
+        let mut is_gone = draft.is_made.clone();
+        draft.triangles.as_flattened().iter().for_each(|&corner| is_gone[corner as usize] = false);
+        drop_marked(&mut draft.positions, &is_gone);
+        drop_marked(&mut draft.is_made, &is_gone);
+        renumber_kept(draft.triangles.as_flattened_mut(), &is_gone);
     }
 }
 
@@ -333,10 +238,11 @@ pub(in crate::mesh_repair) mod tests {
     fn fans_hold_whole_triangles_too_and_are_only_where_something_was_created() {
         let mut draft = draft();
         let rings = VertexRings::of(&mut draft);
-        assert_eq!(rings.around(4), [0, 1, 2, 3]);
-        assert_eq!(rings.around(0), [0, 3, 4, 5]);
-        assert_eq!((rings.ring(0), rings.ring(1)), (vec![1, 2, 3, 4], vec![0, 2, 4]));
-        assert!(rings.around(7).is_empty());
+        let ring = |vertex: u32| rings.fans.ring(&rings.draft.triangles, vertex);
+        assert_eq!(rings.fans.around(4), [0, 1, 2, 3]);
+        assert_eq!(rings.fans.around(0), [0, 3, 4, 5]);
+        assert_eq!((ring(0), ring(1)), (vec![1, 2, 3, 4], vec![0, 2, 4]));
+        assert!(rings.fans.around(7).is_empty());
     }
 
     #[test]
@@ -344,9 +250,10 @@ pub(in crate::mesh_repair) mod tests {
         let mut draft = draft();
         let rings = VertexRings::of(&mut draft);
         // Vertices 1 and 3 are adjacent to 0 and 4, but 2 is, too.
-        assert!(!rings.may_join(4, 0) && !rings.may_join(4, 2));
+        let may_join = |a: u32, b: u32| rings.fans.may_join(&rings.draft.triangles, a, b);
+        assert!(!may_join(4, 0) && !may_join(4, 2));
         // Only 0 and 2 are adjacent to 1 and 4.
-        assert!(rings.may_join(4, 1) && rings.may_join(4, 3));
+        assert!(may_join(4, 1) && may_join(4, 3));
         let [a, b, c, d] = [1, 4, 0, 2];
         let into = Change::Collapse { from: 4, to: 1, position: DVec3::repeat(1.0) };
         // The edge 0-2 exists already; that from 1 to 3 does not, but 0-1 has a whole triangle beyond it.

@@ -10,7 +10,9 @@ use std::collections::VecDeque;
 
 use super::{Draft, Source};
 use crate::geometry::DVec3;
-use editable_mesh::{Change, VertexRings, flipped};
+use crate::geometry::fans::flipped;
+use crate::geometry::shape::{altitude, normal};
+use editable_mesh::{Change, VertexRings};
 
 /// Quality below which a triangle is a sliver: the 1e-4 guaranteed for a repaired mesh, with a margin.
 const LEAST: f64 = 4e-4;
@@ -93,19 +95,6 @@ fn apart([a, b, c, d]: [DVec3; 4]) -> f64 {
     let length = across.norm();
     // Collinear diagonals have no distance, and parallel ones bound no area.
     if length > 0.0 { (c - a).dot(&across).abs() / length } else { 0.0 }
-}
-
-/// A normal of a triangle, as long as twice its area (square cells).
-fn normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
-    (b - a).cross(&(c - a))
-}
-
-/// Altitude of a triangle on its longest edge, over that edge, which counts as at least `least` (cells); 0 if all corners are at one
-/// position.
-fn altitude(corners: &[DVec3; 3], least: f64) -> f64 {
-    let [a, b, c] = corners;
-    let square = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
-    if square > 0.0 { normal(corners).norm() / square.max(least * least) } else { 0.0 }
 }
 
 /// Quality of a triangle: see the top of this file.

@@ -42,8 +42,7 @@ impl Clip {
             // Extensions may leave the node out; frazil animates nodes only.
             let node = channel.target().node();
             let sampler = channel.sampler();
-            let times: Vec<f64> =
-                file.rows::<1>(&sampler.input())?.into_iter().map(|[time]| f64::from(time)).collect();
+            let times = numbers::<1>(file, &sampler.input())?;
             if times.is_empty() {
                 continue;
             }
@@ -51,16 +50,10 @@ impl Clip {
                 return Err(format!("the keys of node \"{}\" are not in order", node.name().unwrap_or("?")));
             }
             let property = channel.target().property();
-            let wide = |rows: Vec<[f32; 3]>| rows.as_flattened().iter().map(|&v| f64::from(v)).collect();
-            let values: Vec<f64> = match property {
-                Property::Translation | Property::Scale => wide(file.rows::<3>(&sampler.output())?),
-                Property::Rotation => {
-                    let rows = file.rows::<4>(&sampler.output())?;
-                    rows.as_flattened().iter().map(|&v| f64::from(v)).collect()
-                }
-                Property::MorphTargetWeights => {
-                    file.rows::<1>(&sampler.output())?.into_iter().map(|[value]| f64::from(value)).collect()
-                }
+            let values = match property {
+                Property::Translation | Property::Scale => numbers::<3>(file, &sampler.output())?,
+                Property::Rotation => numbers::<4>(file, &sampler.output())?,
+                Property::MorphTargetWeights => numbers::<1>(file, &sampler.output())?,
             };
             let interpolation = sampler.interpolation();
             let rows = times.len() * if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
@@ -70,14 +63,10 @@ impl Clip {
             }
             channels.push(Channel { node: node.index(), property, interpolation, times, values, width });
         }
-        let ends = |pick: fn(&Channel) -> f64| channels.iter().map(pick);
-        let start = ends(|c| c.times[0]).fold(f64::INFINITY, f64::min);
-        let end = ends(|c| c.times[c.times.len() - 1]).fold(f64::NEG_INFINITY, f64::max);
-        if channels.is_empty() {
-            Ok(Self { channels, start: 0.0, end: 0.0 })
-        } else {
-            Ok(Self { channels, start, end })
-        }
+        let ends = channels.iter().map(|channel| (channel.times[0], channel.times[channel.times.len() - 1]));
+        let ends = ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        let (start, end) = ends.unwrap_or_default();
+        Ok(Self { channels, start, end })
     }
 
     /// Sets the transforms that the clip animates to their values at a time of the clip (s).
@@ -155,6 +144,11 @@ impl Channel {
             }
         }
     }
+}
+
+/// The numbers of an accessor, row after row.
+fn numbers<const N: usize>(file: &File, accessor: &gltf::Accessor) -> Result<Vec<f64>, String> {
+    Ok(file.rows::<N>(accessor)?.as_flattened().iter().map(|&number| f64::from(number)).collect())
 }
 
 /// Interpolates two rotations (x, y, z, w) along the shorter arc.

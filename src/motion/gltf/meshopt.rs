@@ -74,15 +74,6 @@ fn narrowed(indices: &[u32], stride: usize) -> Result<Vec<u8>, String> {
 
 /// Undoes a filter that made the numbers easier to compress.
 fn unfilter(view: &Compressed, bytes: &mut [u8]) -> Result<(), String> {
-    let halves = |bytes: &[u8]| -> Vec<[u16; 4]> {
-        let half = |row: &[u8], at: usize| u16::from_le_bytes([row[2 * at], row[2 * at + 1]]);
-        bytes.chunks_exact(8).map(|row| std::array::from_fn(|at| half(row, at))).collect()
-    };
-    let store = |bytes: &mut [u8], rows: &[[u16; 4]]| {
-        for (out, value) in bytes.chunks_exact_mut(2).zip(rows.as_flattened()) {
-            out.copy_from_slice(&value.to_le_bytes());
-        }
-    };
     match (view.filter.as_str(), view.stride) {
         ("NONE", _) => {}
         ("OCTAHEDRAL", 4) => {
@@ -91,15 +82,17 @@ fn unfilter(view: &Compressed, bytes: &mut [u8]) -> Result<(), String> {
             filter::decode_filter_oct_8(&mut rows);
             bytes.copy_from_slice(rows.as_flattened());
         }
-        ("OCTAHEDRAL", 8) => {
-            let mut rows = halves(bytes);
-            filter::decode_filter_oct_16(&mut rows);
-            store(bytes, &rows);
-        }
-        ("QUATERNION", 8) => {
-            let mut rows = halves(bytes);
-            filter::decode_filter_quat(&mut rows);
-            store(bytes, &rows);
+        ("OCTAHEDRAL" | "QUATERNION", 8) => {
+            let half = |row: &[u8], at: usize| u16::from_le_bytes([row[2 * at], row[2 * at + 1]]);
+            let row = |row: &[u8]| -> [u16; 4] { std::array::from_fn(|at| half(row, at)) };
+            let mut rows: Vec<[u16; 4]> = bytes.chunks_exact(8).map(row).collect();
+            match view.filter.as_str() {
+                "OCTAHEDRAL" => filter::decode_filter_oct_16(&mut rows),
+                _ => filter::decode_filter_quat(&mut rows),
+            }
+            for (out, value) in bytes.chunks_exact_mut(2).zip(rows.as_flattened()) {
+                out.copy_from_slice(&value.to_le_bytes());
+            }
         }
         ("EXPONENTIAL", stride) if stride % 4 == 0 => {
             let word = |row: &[u8]| u32::from_le_bytes([row[0], row[1], row[2], row[3]]);

@@ -14,9 +14,9 @@ mod uri;
 use std::collections::HashMap;
 use std::path::Path;
 
+use super::drawn::Moving;
 use super::{Drawn, Motion};
 use crate::error::{Error, Result};
-use crate::geometry::mesh::{renumbered, used};
 use crate::geometry::{DVec3, TriMesh};
 use crate::io::files::caught::caught;
 use clip::{Clip, JUMP};
@@ -70,8 +70,7 @@ pub struct Character {
     /// Node indices, parents first.
     order: Vec<usize>,
     vertices: Vertices,
-    /// The vertices that triangles use, and the triangles over these; `None` if they use all.
-    moving: Option<(Vec<u32>, Vec<[u32; 3]>)>,
+    moving: Moving,
     clip: Option<Clip>,
     play: Play,
     kinks: Vec<f64>,
@@ -97,30 +96,17 @@ impl Character {
         let nodes = nodes::read(&file.document);
         let order = nodes::parents_first(&nodes).ok_or_else(|| wrong("a node is its own ancestor".into()))?;
         let shown = chosen(&file, &nodes, play.node.as_deref()).map_err(wrong)?;
-        let vertices = Vertices::read(&file, |node| shown[node]).map_err(wrong)?;
+        let mut vertices = Vertices::read(&file, |node| shown[node]).map_err(wrong)?;
         if vertices.triangles.is_empty() {
             return Err(wrong("holds no triangles".into()));
         }
         let clip = clip(&file, play.clip.as_deref()).map_err(wrong)?;
         let kinks = clip.as_ref().map(Clip::kinks).unwrap_or_default();
-        let mut character = Self {
-            nodes,
-            order,
-            vertices,
-            moving: None,
-            clip,
-            play,
-            kinks,
-            jump: None,
-            content: file.content,
-        };
-        let rest: Vec<_> = character.nodes.iter().map(|node| node.rest.clone()).collect();
-        character.vertices.face_outward(&nodes::globals(&character.nodes, &character.order, &rest));
-        let triangles = &character.vertices.triangles;
-        character.moving = used(character.vertices.count, triangles).map(|used| {
-            let own = renumbered(triangles, &used);
-            (used, own)
-        });
+        let rest: Vec<_> = nodes.iter().map(|node| node.rest.clone()).collect();
+        vertices.face_outward(&nodes::globals(&nodes, &order, &rest));
+        let moving = Moving::of(vertices.count, &vertices.triangles);
+        let (jump, content) = (None, file.content);
+        let mut character = Self { nodes, order, vertices, moving, clip, play, kinks, jump, content };
         character.jump = character.find_jump();
         Ok(character)
     }
@@ -243,21 +229,12 @@ impl Character {
         self.vertices.pose(&locals, &globals, out);
     }
 
-    /// Keeps only the positions of vertices that triangles use.
-    fn keep_moving(&self, positions: &mut Vec<DVec3>) {
-        if let Some((used, _)) = &self.moving {
-            // Indices ascend: no position is overwritten before it is read.
-            used.iter().enumerate().for_each(|(to, &from)| positions[to] = positions[from as usize]);
-            positions.truncate(used.len());
-        }
-    }
-
     fn find_jump(&self) -> Option<f64> {
         let clip = self.clip.as_ref().filter(|_| self.repeats())?;
         let (mut first, mut last) = (Vec::new(), Vec::new());
         for (time, pose) in [(clip.start, &mut first), (clip.end, &mut last)] {
             self.pose_at_own(time, pose);
-            self.keep_moving(pose);
+            self.moving.keep(pose);
         }
         let size = first.iter().fold((first[0], first[0]), |(l, h), p| (l.inf(p), h.sup(p)));
         let farthest = first.iter().zip(&last).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
@@ -267,16 +244,16 @@ impl Character {
 
 impl Motion for Character {
     fn triangles(&self) -> &[[u32; 3]] {
-        self.moving.as_ref().map_or(&self.vertices.triangles, |(_, own)| own)
+        self.moving.triangles(&self.vertices.triangles)
     }
 
     fn vertex_count(&self) -> usize {
-        self.moving.as_ref().map_or(self.vertices.count, |(used, _)| used.len())
+        self.moving.count
     }
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         self.pose_at_own(self.own_time(time), out);
-        self.keep_moving(out);
+        self.moving.keep(out);
         Ok(())
     }
 

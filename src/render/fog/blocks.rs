@@ -9,6 +9,7 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::numeric::blocks::{DIM, Mask, Origin, Values, offset};
+use crate::render::camera::corner;
 
 /// Samples along an edge of a block: its own voxels and the first of the next block, so that every position in the block is
 /// interpolated from its samples alone.
@@ -296,11 +297,7 @@ impl Fog {
         });
         let (low, high) = boxes.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))?;
         let half = DVec3::repeat(0.5);
-        let ends = [low - half, high + half];
-        let corners = (0..8).map(|n| {
-            let at = [0, 1, 2].map(|axis| ends[n >> axis & 1][axis]);
-            self.placement.to_world(DVec3::from(at))
-        });
+        let corners = (0..8).map(|n| self.placement.to_world(corner((low - half, high + half), n)));
         corners.map(|at| (at, at)).reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))
     }
 }

@@ -147,6 +147,14 @@ impl InFog<'_> {
     }
 }
 
+/// The fogs that a ray from a point (m) in a direction (a unit vector) meets up to `end` (m).
+fn entered(fogs: &[Fog], (from, toward): (DVec3, DVec3), end: f64) -> impl Iterator<Item = InFog<'_>> {
+    fogs.iter().enumerate().filter_map(move |(index, fog)| {
+        let mut walk = Walk::new(fog, from, toward, end)?;
+        walk.next().map(|stretch| InFog { index, walk, stretch })
+    })
+}
+
 /// Goes along a ray from a point (m) in a direction (a unit vector), at most to `end` (m), through everything that is not empty, in steps
 /// of at most `stride` voxels. Calls `each` with the start and the end of a step (m) and the positions at its middle, one for each fog
 /// there, until it returns false.
@@ -157,11 +165,7 @@ pub(super) fn along(
     stride: f64,
     mut each: impl FnMut(f64, f64, &[Here]) -> bool,
 ) {
-    let enter = |(index, fog)| {
-        let mut walk = Walk::new(fog, from, toward, end)?;
-        walk.next().map(|stretch| InFog { index, walk, stretch })
-    };
-    let mut ways: Vec<InFog<'_>> = fogs.iter().enumerate().filter_map(enter).collect();
+    let mut ways: Vec<InFog<'_>> = entered(fogs, (from, toward), end).collect();
     let mut here = Vec::with_capacity(ways.len());
     let mut at = 0.0f64;
     while !ways.is_empty() {
@@ -196,12 +200,8 @@ pub(super) fn along(
 }
 
 /// Where a ray from a point (m) in a direction (a unit vector) first enters a block that is not empty.
-pub(super) fn entry(fogs: &[Fog], (from, toward): (DVec3, DVec3)) -> Option<Here> {
-    let enter = |(index, fog)| {
-        let mut walk = Walk::new(fog, from, toward, f64::INFINITY)?;
-        walk.next().map(|stretch| InFog { index, walk, stretch })
-    };
-    let ways = fogs.iter().enumerate().filter_map(enter);
+pub(super) fn entry(fogs: &[Fog], ray: (DVec3, DVec3)) -> Option<Here> {
+    let ways = entered(fogs, ray, f64::INFINITY);
     let first = ways.reduce(|a, b| if b.stretch.from < a.stretch.from { b } else { a })?;
     Some(first.here(first.stretch.from))
 }

@@ -159,7 +159,7 @@ impl Cache {
         }
         let chain = Chain::new(seen, last.from, &last.seed);
         let mut cache = Self { stored, record, chain, forgotten: Vec::new() };
-        match cache.first_changed(stage, upstream)? {
+        match cache.first_changed(stage, &FrameChoice::none(), upstream)? {
             None => Ok(()),
             Some(frame) => {
                 let what = format!("other inputs from frame {frame} on ({})", read_by(stage, frame));
@@ -196,54 +196,46 @@ impl Cache {
     /// Refuses frames whose inputs have changed since. A frame whose files of the coming frame have changed or appeared is made again if it
     /// is requested.
     ///
+    /// # Errors
     /// The changed frame; a file that cannot be read.
-    /// The frame; a file that cannot be read.
     pub fn check_inputs(
         &mut self,
         stage: &dyn Stage,
         asked: &FrameChoice,
         upstream: &[&Stored],
     ) -> Result<()> {
+        let Some(frame) = self.first_changed(stage, asked, upstream)? else { return Ok(()) };
+        let what = format!(
+            "the inputs of frame {frame} have changed since it was made ({}): --from {frame} keeps the frames before it",
+            read_by(stage, frame)
+        );
+        Err(Error::file(self.stored.folder(), what))
+    }
+
+    /// The first frame with the current settings that was made from other inputs. Frames before it whose files of the coming frame have
+    /// changed are left out if they are requested.
+    fn first_changed(
+        &mut self,
+        stage: &dyn Stage,
+        asked: &FrameChoice,
+        upstream: &[&Stored],
+    ) -> Result<Option<i32>> {
         let own = self.own_from();
-        let frames: Vec<i32> = self.stored.frames().filter(|frame| *frame >= own).collect();
+        // An upstream frame that is not done may still be made in this run, and is checked then; or it is gone, and there is nothing to
+        // compare.
+        let is_read = |frame: &i32| *frame >= own && upstream.iter().all(|upstream| upstream.is_done(*frame));
+        let frames: Vec<i32> = self.stored.frames().filter(is_read).collect();
         for frame in frames {
-            let Some(manifest) = self.stored.manifest(frame).cloned() else { continue };
-            // An upstream frame that is not done may still be made in this run, and is checked then; or it is gone, and there is nothing to
-            // compare.
-            if upstream.iter().any(|upstream| !upstream.is_done(frame)) {
-                continue;
-            }
             let made = self.inputs(stage, frame, upstream)?;
+            let Some(manifest) = self.stored.manifest(frame) else { continue };
             if manifest.inputs != made.from {
-                return Err(self.changed_inputs(stage, frame));
+                return Ok(Some(frame));
             }
             if manifest.next != made.next && asked.contains(frame) {
                 self.stored.leave_out(frame);
             }
         }
-        Ok(())
-    }
-
-    /// The first frame with the current settings that was made from other inputs.
-    fn first_changed(&mut self, stage: &dyn Stage, upstream: &[&Stored]) -> Result<Option<i32>> {
-        let own = self.own_from();
-        let is_read = |frame: &i32| *frame >= own && upstream.iter().all(|upstream| upstream.is_done(*frame));
-        let frames: Vec<i32> = self.stored.frames().filter(is_read).collect();
-        for frame in frames {
-            let made = self.inputs(stage, frame, upstream)?;
-            if self.stored.manifest(frame).is_some_and(|manifest| manifest.inputs != made.from) {
-                return Ok(Some(frame));
-            }
-        }
         Ok(None)
-    }
-
-    fn changed_inputs(&self, stage: &dyn Stage, frame: i32) -> Error {
-        let what = format!(
-            "the inputs of frame {frame} have changed since it was made ({}): --from {frame} keeps the frames before it",
-            read_by(stage, frame)
-        );
-        Error::file(self.stored.folder(), what)
     }
 
     /// Hashes of a frame's inputs.

@@ -18,13 +18,11 @@ mod stored;
 mod usd;
 pub mod verify;
 
-pub use crate::scene::run::plan::Plan;
-pub use crate::scene::run::stage::{Clip, Volume};
-pub use crate::scene::run::stage::{MovingMesh, Prims};
 pub use pass::AnyStage;
+pub use plan::Plan;
 pub use runner::Run;
 #[cfg(test)]
 pub(in crate::scene) use settings::changed;
 pub use settings::{CONTENT, Settings};
-pub use stage::{FrameFiles, Kind, Reads, Report, Stage, Stepped, Stepping, To};
+pub use stage::{FrameFiles, Kind, Reads, Report, Stage, Stepped, Stepping, To, Volume};
 pub use stored::Stored;

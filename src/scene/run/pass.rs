@@ -42,9 +42,6 @@ pub struct Shared<'a> {
 
 /// A stage of any type, with the pass that makes its frames.
 pub trait AnyStage: Stage {
-    /// The stage itself, as a [`Stage`].
-    fn as_stage(&self) -> &dyn Stage;
-
     /// See [`Stepping::foresee`].
     #[doc(hidden)]
     fn looks_ahead(&self, ctx: &Context, upstream: &[&Stored], last: i32) -> Result<()>;
@@ -55,10 +52,6 @@ pub trait AnyStage: Stage {
 }
 
 impl<S: Stepping> AnyStage for S {
-    fn as_stage(&self) -> &dyn Stage {
-        self
-    }
-
     fn looks_ahead(&self, ctx: &Context, upstream: &[&Stored], last: i32) -> Result<()> {
         self.foresee(ctx, upstream, last)
     }
@@ -70,16 +63,23 @@ impl<S: Stepping> AnyStage for S {
 
 /// A pass that is ready to start.
 pub trait Pass: Send {
-    /// Makes frames, ascending; `cache` gets the records of those that were written, even if the pass fails.
+    /// Makes frames.
     #[doc(hidden)]
-    fn make(
-        self: Box<Self>,
-        shared: &Shared<'_>,
-        cache: &mut Cache,
-        upstream: &[&Stored],
-        todo: &[i32],
-        every_state: bool,
-    ) -> Result<()>;
+    fn make(self: Box<Self>, work: Work<'_>) -> Result<()>;
+}
+
+/// The frames that a pass makes.
+pub struct Work<'a> {
+    /// Shared with the other passes.
+    pub shared: &'a Shared<'a>,
+    /// Gets the records of the frames that were written, even if the pass fails.
+    pub cache: &'a mut Cache,
+    /// The frames of the stages upstream.
+    pub upstream: &'a [&'a Stored],
+    /// The frames to make, ascending.
+    pub todo: &'a [i32],
+    /// Whether the exact states of all frames are kept, as another stage reads them.
+    pub every_state: bool,
 }
 
 /// A stage's state after a frame.
@@ -123,15 +123,9 @@ impl<'a, S: Stepping> At<'a, S> {
     }
 
     /// Steps to every wanted frame; `send` passes the work to the writing thread and returns whether that still listens.
-    fn step_all(
-        mut self,
-        shared: &Shared<'_>,
-        cache: &mut Cache,
-        upstream: &[&Stored],
-        todo: &[i32],
-        send: impl Fn(Job<S>) -> bool,
-    ) -> Result<()> {
-        let (stage, ctx) = (self.stage, shared.ctx);
+    fn step_all(mut self, work: &mut Work<'_>, send: impl Fn(Job<S>) -> bool) -> Result<()> {
+        let Work { shared, upstream, todo, .. } = *work;
+        let (stage, ctx, cache) = (self.stage, shared.ctx, &mut *work.cache);
         let mut follows = false;
         for &wanted in todo {
             let is_nearer = || cache.stored.latest_state(self.frame + 1..=wanted - 1).is_some();
@@ -162,25 +156,19 @@ impl<'a, S: Stepping> At<'a, S> {
 }
 
 impl<S: Stepping> Pass for At<'_, S> {
-    fn make(
-        self: Box<Self>,
-        shared: &Shared<'_>,
-        cache: &mut Cache,
-        upstream: &[&Stored],
-        todo: &[i32],
-        every_state: bool,
-    ) -> Result<()> {
-        let folder = cache.stored.folder().to_path_buf();
+    fn make(self: Box<Self>, mut work: Work<'_>) -> Result<()> {
+        let folder = work.cache.stored.folder().to_path_buf();
+        let Work { shared, every_state, .. } = work;
         let files = Files { stage: self.stage, folder: &folder, first: shared.first, every_state };
         let (jobs, waiting) = sync_channel(WAITING);
         let (made, finished) = std::thread::scope(|scope| {
             let writing = scope.spawn(|| files.write_all(waiting, shared.done));
-            let made = self.step_all(shared, cache, upstream, todo, |job| jobs.send(job).is_ok());
+            let made = self.step_all(&mut work, |job| jobs.send(job).is_ok());
             drop(jobs);
             (made, writing.join())
         });
         let (manifests, written) = finished.unwrap_or_else(|why| resume_unwind(why));
-        manifests.into_iter().for_each(|manifest| cache.stored.add(manifest));
+        manifests.into_iter().for_each(|manifest| work.cache.stored.add(manifest));
         // A writer's error also stopped the steps, and is the one to report.
         written.and(made)
     }

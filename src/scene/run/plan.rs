@@ -24,7 +24,7 @@ pub struct Plan<'a> {
 impl Plan<'_> {
     /// The stages, as descriptions.
     pub fn stages(&self) -> impl Iterator<Item = &dyn Stage> {
-        self.stages.iter().map(|stage| stage.as_stage())
+        self.stages.iter().map(|stage| &**stage as &dyn Stage)
     }
 
     /// Names of all stages, in their order.
@@ -39,13 +39,8 @@ impl Plan<'_> {
             let what = format!("has no stage \"{unknown}\": its stages are {names}");
             return Err(Error::file(&self.scene.path, what));
         }
-        let wanted = |stage: &dyn Stage| only.is_empty() || only.iter().any(|name| name == stage.name());
-        Ok(self
-            .stages()
-            .enumerate()
-            .filter(|(_, stage)| wanted(*stage))
-            .map(|(position, _)| position)
-            .collect())
+        let wanted = |name: &str| only.is_empty() || only.iter().any(|known| known == name);
+        Ok((0..self.stages.len()).filter(|position| wanted(self.stages[*position].name())).collect())
     }
 
     /// The stages that depend on these, directly or indirectly, by index.
@@ -63,12 +58,9 @@ impl Plan<'_> {
 
     /// Refuses frames that the chosen stages read from other stages, if this scene would not make them as they are.
     pub(super) fn refuse_stale(&self, chosen: &[usize], folder: &Path) -> Result<()> {
-        for reader in chosen.iter().map(|position| self.stages[*position].as_stage()) {
-            let is_read = |position: &usize| reader.upstream().contains(&self.stages[*position].name());
-            for position in
-                (0..self.stages.len()).filter(|position| is_read(position) && !chosen.contains(position))
-            {
-                let stage = self.stages[position].as_stage();
+        for reader in chosen.iter().map(|position| &self.stages[*position]) {
+            let others = self.stages().enumerate().filter(|(position, _)| !chosen.contains(position));
+            for (_, stage) in others.filter(|(_, stage)| reader.upstream().contains(&stage.name())) {
                 let upstream = stage.upstream().iter().map(|name| Stored::read(folder, name));
                 let upstream: Vec<Stored> = upstream.collect::<Result<_>>()?;
                 let upstream: Vec<&Stored> = upstream.iter().collect();

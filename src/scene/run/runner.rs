@@ -8,7 +8,7 @@ use std::thread::ScopedJoinHandle;
 
 use super::cache::{Asked, Cache, refuse_asked};
 use super::own_files::Own;
-use super::pass::{AnyStage, Pass, Shared};
+use super::pass::{AnyStage, Pass, Shared, Work};
 use super::plan::Plan;
 use super::stage::{Report, Stage};
 use super::stored::Stored;
@@ -64,7 +64,7 @@ impl<'a> Run<'a> {
         let chosen = plan.chosen(only)?;
         let asked = Asked { first: plan.scene.shot.frames.first, frames, from };
         // A refused run leaves no folder behind; changes by another run meanwhile are checked again below.
-        let of_run = || chosen.iter().map(|position| plan.stages[*position].as_stage());
+        let of_run = || chosen.iter().map(|position| &*plan.stages[*position] as &dyn Stage);
         for stage in of_run() {
             refuse_asked(stage, asked, &Stored::read(folder, stage.name())?)?;
         }
@@ -107,12 +107,12 @@ impl<'a> Run<'a> {
             }
             return Ok(run);
         }
-        let mut cache = Cache::open(stage.as_stage(), self.plan.seen, folder, asked)?;
-        let upstream = self.upstream(stage.as_stage(), folder)?;
-        cache.check_inputs(stage.as_stage(), asked.frames, &upstream.iter().collect::<Vec<_>>())?;
+        let mut cache = Cache::open(stage, self.plan.seen, folder, asked)?;
+        let upstream = self.upstream(stage, folder)?;
+        cache.check_inputs(stage, asked.frames, &upstream.iter().collect::<Vec<_>>())?;
         let (there, todo): (Vec<i32>, Vec<i32>) =
             asked.frames.iter().partition(|frame| cache.stored.is_done(*frame));
-        self.refuse_missing(stage.as_stage(), &cache.stored, &todo, &upstream)?;
+        self.refuse_missing(stage, &cache.stored, &todo, &upstream)?;
         (run.there, run.todo, run.cache) = (there.len(), todo, Some(cache));
         Ok(run)
     }
@@ -167,7 +167,7 @@ impl<'a> Run<'a> {
             let run = &self.stages[position];
             let waits = run.stage.upstream().iter().any(|name| busy.contains(name));
             if let ([frame, ..], Some(cache), false) = (&run.todo[..], &run.cache, waits) {
-                let upstream = self.upstream(run.stage.as_stage(), self.own.folder())?;
+                let upstream = self.upstream(run.stage, self.own.folder())?;
                 let last = run.todo.last().copied().unwrap_or(*frame);
                 run.stage.looks_ahead(ctx, &upstream.iter().collect::<Vec<_>>(), last)?;
                 self.stages[position].start = Some(run.stage.before(ctx, *frame, cache.kept(first))?);
@@ -186,7 +186,7 @@ impl<'a> Run<'a> {
                 self.own.begin(run.stage.name(), first, last)?;
             }
             if let Some(cache) = &mut run.cache {
-                cache.commit(run.stage.as_stage())?;
+                cache.commit(run.stage)?;
             }
         }
         self.own.write(own_files::SCENE, self.plan.scene.to_toml_in(self.own.folder()).as_bytes())
@@ -239,8 +239,8 @@ impl<'a> Run<'a> {
         let busy: Vec<&str> =
             self.stages.iter().filter(|run| !run.todo.is_empty()).map(|run| run.stage.name()).collect();
         let waits = |run: &StageRun<'_>| run.stage.upstream().iter().any(|name| busy.contains(name));
-        let positions = self.stages.iter().enumerate().filter(|(_, run)| !run.todo.is_empty() && !waits(run));
-        let ready: Vec<usize> = positions.map(|(position, _)| position).collect();
+        let is_ready = |run: &StageRun<'_>| !run.todo.is_empty() && !waits(run);
+        let ready: Vec<usize> = (0..self.stages.len()).filter(|at| is_ready(&self.stages[*at])).collect();
         (!ready.is_empty()).then_some(ready)
     }
 
@@ -268,7 +268,7 @@ impl<'a> Run<'a> {
         let folder = self.own.folder().to_path_buf();
         let upstream: Vec<Vec<Stored>> = ready
             .iter()
-            .map(|position| self.upstream(self.stages[*position].stage.as_stage(), &folder))
+            .map(|position| self.upstream(self.stages[*position].stage, &folder))
             .collect::<Result<_>>()?;
         let plan = self.plan;
         let runs = self.stages.iter_mut().enumerate().filter(|(position, _)| ready.contains(position));
@@ -276,7 +276,7 @@ impl<'a> Run<'a> {
             let threads: Vec<_> = runs
                 .zip(&upstream)
                 .map(|((_, run), upstream)| {
-                    let every_state = plan.keeps_states_of(run.stage.as_stage());
+                    let every_state = plan.keeps_states_of(run.stage);
                     scope.spawn(move || {
                         let stop = StopOthers(shared.stop);
                         let result = run.make(&shared, upstream, every_state);
@@ -312,12 +312,12 @@ impl StageRun<'_> {
             Some(start) => start,
             None => {
                 // The upstream frames were made only in this run.
-                cache.check_inputs(self.stage.as_stage(), &FrameChoice::none(), &upstream)?;
+                cache.check_inputs(self.stage, &FrameChoice::none(), &upstream)?;
                 self.stage.looks_ahead(shared.ctx, &upstream, todo[todo.len() - 1])?;
                 self.stage.before(shared.ctx, todo[0], cache.kept(shared.first))?
             }
         };
-        start.make(shared, cache, &upstream, &todo, every_state)
+        start.make(Work { shared, cache, upstream: &upstream, todo: &todo, every_state })
     }
 }
 

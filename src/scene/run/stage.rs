@@ -8,12 +8,11 @@ use super::settings::Settings;
 use super::stored::Stored;
 use crate::context::{Context, PhaseTime};
 use crate::error::Result;
-use crate::geometry::{Points, Uvs};
+use crate::geometry::TriMesh;
 use crate::io::files::atomic;
+use crate::io::mesh::Carried;
 use crate::io::records::manifest::{Keeps, Written};
-use crate::io::usd::Field;
-use crate::io::usd::materials::Look;
-use crate::io::usd::primvars::Primvar;
+use crate::io::usd::{self, Clips, Field};
 
 /// A folder of a stage's files: `base/base.0012.vdb`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,7 +51,9 @@ pub trait Stage: Sync {
     fn kinds(&self) -> &'static [Kind];
 
     /// Whether this scene has files of a kind.
-    fn writes(&self, kind: &str) -> bool;
+    fn writes(&self, _kind: &str) -> bool {
+        true
+    }
 
     /// Extension of its exact states, lower-case letters but not `json`: `state/base.0012.vdb`.
     fn state_extension(&self) -> &'static str {
@@ -71,7 +72,9 @@ pub trait Stage: Sync {
     fn settings(&self) -> Result<Settings>;
 
     /// Those of its settings that determine the state before the first frame: a run cannot resume from a state with others.
-    fn of_first_state(&self, settings: &Settings) -> Settings;
+    fn of_first_state(&self, _settings: &Settings) -> Settings {
+        Settings::new()
+    }
 
     /// The stages whose frames it reads, all earlier in the scene's order.
     fn upstream(&self) -> &'static [&'static str] {
@@ -99,7 +102,9 @@ pub trait Stage: Sync {
     }
 
     /// What another run can resume from after a frame.
-    fn keeps(&self, frame: i32) -> Keeps;
+    fn keeps(&self, _frame: i32) -> Keeps {
+        Keeps::State
+    }
 
     /// The setting that requires every frame to be made, if one does.
     fn needs_every_frame(&self) -> Option<&'static str> {
@@ -111,8 +116,8 @@ pub trait Stage: Sync {
         Vec::new()
     }
 
-    /// Its moving meshes or points for `shot.usda`.
-    fn clip(&self) -> Option<Clip<'_>> {
+    /// Its moving meshes or points for `shot.usda`, without frames.
+    fn clip(&self) -> Option<Clips<'_>> {
         None
     }
 }
@@ -197,6 +202,14 @@ pub struct Report {
     pub phases: Vec<PhaseTime>,
 }
 
+impl Report {
+    /// A report of results, which are an object.
+    pub(in crate::scene) fn new(results: Value, phases: Vec<PhaseTime>) -> Self {
+        let Value::Object(results) = results else { unreachable!("results have names") };
+        Self { results, phases }
+    }
+}
+
 /// The files of a frame while they are being written.
 pub struct FrameFiles<'a> {
     folder: &'a Path,
@@ -228,6 +241,22 @@ impl<'a> FrameFiles<'a> {
         Ok(())
     }
 
+    /// Writes the .usda file of a kind, with one mesh, at `fps` frames per second.
+    ///
+    /// # Errors
+    /// What the operating system reports.
+    pub(in crate::scene) fn save_clip(
+        &mut self,
+        kind: &str,
+        fps: f64,
+        mesh: &TriMesh,
+        carried: &Carried<'_>,
+    ) -> Result<()> {
+        let mesh = usd::MeshFrame::of(kind, mesh, carried);
+        let text = usd::clip(kind, self.frame, fps, usd::Units::OWN, &[mesh]);
+        self.save(kind, "usda", text.as_bytes())
+    }
+
     /// Writes the exact state after the frame atomically.
     ///
     /// # Errors
@@ -245,16 +274,6 @@ impl<'a> FrameFiles<'a> {
     }
 }
 
-/// A kind of files with one .usda file for each frame.
-pub struct Clip<'a> {
-    /// The kind.
-    pub kind: &'static str,
-    /// What the frames have in common: a file that belongs to no frame.
-    pub manifest: &'static str,
-    /// Contents of the frames.
-    pub prims: Prims<'a>,
-}
-
 /// A volume in the files of a kind.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Volume {
@@ -266,26 +285,4 @@ pub struct Volume {
     pub fields: &'static [Field],
     /// Whether it is a guide: to be viewed, not rendered.
     pub is_guide: bool,
-}
-
-/// Contents of the frames of a [`Clip`].
-pub enum Prims<'a> {
-    /// Moving meshes.
-    Meshes(Vec<MovingMesh<'a>>),
-    /// A surface that is a different mesh at each frame, without velocities: name of its prim.
-    Surface(&'static str),
-    /// Points, in a prim named after the kind; these have their attributes.
-    Points(Points),
-}
-
-/// What the frames of a moving mesh have in common.
-pub struct MovingMesh<'a> {
-    /// Name of its prim.
-    pub name: String,
-    /// Its material.
-    pub look: Look,
-    /// Its texture coordinates.
-    pub uvs: Option<&'a Uvs>,
-    /// Its other arrays.
-    pub primvars: Vec<Primvar>,
 }

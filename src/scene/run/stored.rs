@@ -173,6 +173,16 @@ impl Stored {
         self.compared(written.ok_or_else(missing)?)
     }
 
+    /// Resumes from the exact state after a frame.
+    ///
+    /// # Errors
+    /// As [`Stored::state_file`]; what `resume` refuses, with the name of the file.
+    pub fn resume<T>(&self, frame: i32, resume: impl FnOnce(&[u8]) -> Result<T>) -> Result<T> {
+        let path = self.state_file(frame)?;
+        let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
+        resume(&bytes).map_err(|error| Error::file(path, error.to_string()))
+    }
+
     /// A frame's file of a kind; the content was verified.
     ///
     /// # Errors

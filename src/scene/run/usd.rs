@@ -2,11 +2,10 @@
 
 use super::own_files::{Own, SHOT};
 use super::plan::Plan;
-use super::stage::{Clip, MovingMesh, Prims, Stage, Volume};
+use super::stage::{Stage, Volume};
 use super::stored::Stored;
 use crate::error::Result;
-use crate::io::usd;
-use crate::io::usd::materials::Look;
+use crate::io::usd::{self, Clips, VolumeFiles};
 
 /// Writes the description of the existing frames, by relative paths.
 ///
@@ -18,63 +17,24 @@ pub(super) fn write<'s>(
     files: &mut Own,
 ) -> Result<()> {
     let (frames, fps) = (plan.scene.shot.frames, plan.scene.shot.fps);
-    let stages: Vec<_> = stages.collect();
     let relative = |stored: &Stored, kind: &str| -> Vec<(i32, String)> {
         let files = stored.files(kind).into_iter().filter(|(frame, _)| frames.contains(*frame));
         files.map(|(frame, path)| (frame, format!("./{path}"))).collect()
     };
-    let volumes: Vec<(Volume, Vec<(i32, String)>)> = stages
-        .iter()
-        .flat_map(|(stage, stored)| stage.volumes().into_iter().map(|v| (v, relative(stored, v.kind))))
-        .collect();
-    let volumes: Vec<usd::VolumeFiles> = volumes
-        .iter()
-        .map(|(Volume { prim, fields, is_guide, .. }, files)| usd::VolumeFiles {
-            name: prim,
-            fields,
-            is_guide: *is_guide,
-            files,
-        })
-        .collect();
-    let clips = stages.iter().filter_map(|(stage, stored)| {
-        let clip = stage.clip()?;
+    let (mut volumes, mut clips): (Vec<VolumeFiles>, Vec<Clips>) = (Vec::new(), Vec::new());
+    for (stage, stored) in stages {
+        volumes.extend(stage.volumes().into_iter().map(|Volume { kind, prim: name, fields, is_guide }| {
+            VolumeFiles { name, fields, is_guide, files: relative(stored, kind) }
+        }));
+        let Some(mut clip) = stage.clip() else { continue };
         let files = relative(stored, clip.kind).into_iter().filter(|(_, file)| file.ends_with(".usda"));
-        let frames: Vec<i32> = files.map(|(frame, _)| frame).collect();
-        (!frames.is_empty()).then_some((clip, frames))
-    });
-    let clips: Vec<(Clip, Vec<i32>)> = clips.collect();
-    let clips: Vec<(&str, usd::Clips)> = clips
-        .iter()
-        .map(|(clip, frames)| {
-            let prims = match &clip.prims {
-                Prims::Meshes(meshes) => usd::ClipPrims::Meshes(
-                    meshes
-                        .iter()
-                        .map(|MovingMesh { name, look, uvs, primvars }| usd::MeshPrim {
-                            name,
-                            look: *look,
-                            moves: true,
-                            uvs: *uvs,
-                            primvars,
-                        })
-                        .collect(),
-                ),
-                Prims::Surface(name) => usd::ClipPrims::Meshes(vec![usd::MeshPrim {
-                    name,
-                    look: Look::Snow,
-                    moves: false,
-                    uvs: None,
-                    primvars: &[],
-                }]),
-                Prims::Points(points) => usd::ClipPrims::Points(points),
-            };
-            (clip.manifest, usd::Clips { kind: clip.kind, frames: frames.clone(), prims })
-        })
-        .collect();
-    for (manifest, clips) in &clips {
-        files.write(manifest, usd::clip_manifest(clips.kind, &clips.prims).as_bytes())?;
+        clip.frames.extend(files.map(|(frame, _)| frame));
+        clips.extend(Some(clip).filter(|clip| !clip.frames.is_empty()));
     }
-    let clips: Vec<usd::Clips> = clips.into_iter().map(|(_, clips)| clips).collect();
+    for Clips { kind, prims, .. } in &clips {
+        let manifest = usd::clip_manifest(kind, prims);
+        files.write(&format!("{kind}/{kind}.manifest.usda"), manifest.as_bytes())?;
+    }
     let time = usd::StageTime { first: frames.first, last: frames.last, fps };
     let comment = format!("made by frazil {}", env!("CARGO_PKG_VERSION"));
     let text = usd::stage(&comment, time, &volumes, &clips);

@@ -61,14 +61,54 @@ pub enum Fallback {
 
 /// The key's line in the scene that `frazil new` prints.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Example {
-    /// The default, commented out.
-    Default,
-    /// Another value, commented out.
-    Other(&'static str),
-    /// A value that the scene requires.
-    Needed(&'static str),
+pub struct Example {
+    /// Another value than the default.
+    pub value: Option<&'static str>,
+    /// Whether the scene to begin with has it; else it is commented out.
+    pub is_shown: bool,
 }
+
+/// What holds in a scene that leaves a key out, and the example of a starter scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unset {
+    fallback: Fallback,
+    example: Example,
+}
+
+/// A default, as a scene writes it.
+pub const fn or(value: &'static str) -> Unset {
+    Unset { fallback: Fallback::Is(value), example: Example { value: None, is_shown: false } }
+}
+
+/// A default in cells.
+pub const fn or_cells(cells: f64) -> Unset {
+    Unset { fallback: Fallback::Cells(cells), ..or("") }
+}
+
+/// No value by default; with an example.
+pub const fn optional(example: &'static str) -> Unset {
+    Unset { fallback: Fallback::Nothing, ..or("") }.such_as(example)
+}
+
+/// An error; with an example.
+pub const fn required(example: &'static str) -> Unset {
+    Unset { fallback: Fallback::Required, ..or("") }.such_as(example)
+}
+
+impl Unset {
+    /// The example has another value than the default.
+    pub const fn such_as(self, value: &'static str) -> Self {
+        Self { example: Example { value: Some(value), is_shown: false }, ..self }
+    }
+
+    /// The example is not commented out.
+    pub const fn shown(self) -> Self {
+        Self { example: Example { is_shown: true, ..self.example }, ..self }
+    }
+}
+
+/// The stages that depend on a key.
+pub type Scopes = &'static [(&'static str, Scope)];
 
 /// A key of a scene. Once declared in its system's list, a key is read, checked, written with its default and documented; a stage gets its
 /// value from [`super::Values`].
@@ -91,53 +131,33 @@ pub struct Key {
     /// Its meaning, for the resolved scene, the starter scene and the reference.
     pub meaning: &'static str,
     /// The stages that depend on it.
-    pub scopes: &'static [(&'static str, Scope)],
+    pub scopes: Scopes,
 }
 
 impl Key {
-    /// A required key.
-    pub const fn new(table: &'static str, name: &'static str, kind: Kind, meaning: &'static str) -> Self {
+    /// A key that no stage depends on.
+    pub const fn new(table: &'static str, name: &'static str, kind: Kind, unset: Unset) -> Self {
         Self {
             table,
             name,
             kind,
-            fallback: Fallback::Required,
+            fallback: unset.fallback,
             presets: &[],
-            example: Example::Default,
+            example: unset.example,
             of_characters: false,
-            meaning,
+            meaning: "",
             scopes: &[],
         }
     }
 
-    /// Its default: a value as a scene writes it.
-    pub const fn or(self, value: &'static str) -> Self {
-        Self { fallback: Fallback::Is(value), ..self }
-    }
-
-    /// Its default: a number of cells.
-    pub const fn or_cells(self, cells: f64) -> Self {
-        Self { fallback: Fallback::Cells(cells), ..self }
+    /// Its meaning.
+    pub const fn means(self, meaning: &'static str) -> Self {
+        Self { meaning, ..self }
     }
 
     /// The default instead if the table's `preset`, or `liquid`, has one of these names.
     pub const fn with_presets(self, presets: &'static [(&'static str, &'static str)]) -> Self {
         Self { presets, ..self }
-    }
-
-    /// It is optional, and without a value by default.
-    pub const fn or_nothing(self) -> Self {
-        Self { fallback: Fallback::Nothing, ..self }
-    }
-
-    /// Its value in a starter scene, commented out.
-    pub const fn such_as(self, value: &'static str) -> Self {
-        Self { example: Example::Other(value), ..self }
-    }
-
-    /// Its value in a starter scene.
-    pub const fn begins_with(self, value: &'static str) -> Self {
-        Self { example: Example::Needed(value), ..self }
     }
 
     /// It applies to characters only.
@@ -146,7 +166,7 @@ impl Key {
     }
 
     /// The stages that depend on it.
-    pub const fn concerns(self, scopes: &'static [(&'static str, Scope)]) -> Self {
+    pub const fn concerns(self, scopes: Scopes) -> Self {
         Self { scopes, ..self }
     }
 

@@ -1,6 +1,6 @@
 //! Documentation of all keys: a starter scene, and a table.
 
-use super::key::{Example, Fallback, Key, Kind, heading, is_many};
+use super::key::{Fallback, Key, Kind, heading, is_many};
 use super::keys::{self, tables};
 
 use super::toml_table::with_value;
@@ -16,7 +16,7 @@ pub fn template_of([title, name]: [&str; 2], keys: &[Key]) -> String {
     );
     for table in tables(keys) {
         let keys_of = || keys.iter().filter(|key| key.table == table);
-        let is_needed = keys_of().any(|key| matches!(key.example, Example::Needed(_)));
+        let is_needed = keys_of().any(|key| key.example.is_shown);
         let many = match table {
             _ if is_many(table) => "  # as many as there are",
             _ if keys::OPTIONAL.contains(&table) => "  # only with this line are there any",
@@ -30,11 +30,8 @@ pub fn template_of([title, name]: [&str; 2], keys: &[Key]) -> String {
 
 /// A key's line in a starter scene.
 fn example(key: &Key, keys: &[Key]) -> String {
-    let (mark, value) = match key.example {
-        Example::Needed(value) => ("", value.to_string()),
-        Example::Other(value) => ("# ", value.to_string()),
-        Example::Default => ("# ", default_value(key, keys)),
-    };
+    let mark = if key.example.is_shown { "" } else { "# " };
+    let value = key.example.value.map_or_else(|| default_value(key, keys), str::to_string);
     let characters = if key.of_characters { "of a .glb: " } else { "" };
     let (first, rest) =
         value.split_once('\n').map_or((&value[..], None), |(first, rest)| (first, Some(rest)));
@@ -46,8 +43,7 @@ fn example(key: &Key, keys: &[Key]) -> String {
 /// The default, with the cell size of the starter scene.
 fn default_value(key: &Key, keys: &[Key]) -> String {
     let cell = || {
-        let example = keys.iter().find(|key| key.table == "snow" && key.name == "cell")?.example;
-        let Example::Needed(value) = example else { return None };
+        let value = keys.iter().find(|key| key.table == "snow" && key.name == "cell")?.example.value?;
         with_value("cell", value, |table| table.number("cell")).ok()?
     };
     match key.fallback {

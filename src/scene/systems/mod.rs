@@ -15,7 +15,7 @@ mod tests {
     use crate::io::records::input_hashes::InputHashes;
     use crate::scene::run::settings::settings_of;
     use crate::scene::schema::Value;
-    use crate::scene::schema::key::{Key, Kind, Scope};
+    use crate::scene::schema::key::{Key, Kind, Scope, or};
     use crate::scene::schema::values::path;
     use crate::scene::schema::{reference_of, template_of};
     use std::path::Path;
@@ -25,8 +25,8 @@ mod tests {
 
     /// All keys of snow and a new one, which is declared only here.
     fn with_a_new_key() -> &'static [Key] {
-        let new = Key::new("snow", "glitter", Kind::Number(0.0, 2.0, "m"), "how far it can be seen")
-            .or("0.5")
+        let new = Key::new("snow", "glitter", Kind::Number(0.0, 2.0, "m"), or("0.5"))
+            .means("how far it can be seen")
             .concerns(&[("base", Scope::Step)]);
         let mut keys = keys::of(System::Snow).to_vec();
         let last = keys.iter().rposition(|key| key.table == "snow").unwrap();

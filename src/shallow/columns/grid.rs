@@ -65,6 +65,24 @@ impl Grid {
         [self.origin[0] + (x as f64 + 0.5) * self.cell, self.origin[1] + (z as f64 + 0.5) * self.cell]
     }
 
+    /// The cells whose centres lie in a circle (m), row by row.
+    pub fn in_circle(&self, [x, z]: [f64; 2], radius: f64) -> impl Iterator<Item = [usize; 2]> {
+        let grid = *self;
+        let reach = radius / grid.cell + 1.0;
+        let range = |axis: usize, at: f64| {
+            let centre = (at - grid.origin[axis]) / grid.cell;
+            let last = grid.size[axis] as f64 - 1.0;
+            let [low, high] = [centre - reach, centre + reach].map(|at| at.floor().clamp(0.0, last) as usize);
+            low..=high
+        };
+        let (columns, rows) = (range(0, x), range(1, z));
+        let cells = rows.flat_map(move |row| columns.clone().map(move |column| [column, row]));
+        cells.filter(move |cell| {
+            let [cx, cz] = grid.centre(*cell);
+            (cx - x).powi(2) + (cz - z).powi(2) <= radius * radius
+        })
+    }
+
     /// The cell at a position (m), if it is inside the grid.
     pub fn cell_at(&self, [x, z]: [f64; 2]) -> Option<[usize; 2]> {
         let at = [(x - self.origin[0]) / self.cell, (z - self.origin[1]) / self.cell].map(f64::floor);
@@ -114,3 +132,11 @@ impl Heights {
 
 /// A box of cells: ranges of x and of z.
 pub type Cells = [Range<usize>; 2];
+
+/// Checks that a box lies within so many cells along x and along z.
+pub(in crate::shallow) fn check_cells([x, z]: &Cells, [nx, nz]: [usize; 2]) -> Result<()> {
+    if x.start > x.end || z.start > z.end || x.end > nx || z.end > nz {
+        return Err(Error::argument(format!("cells {x:?} x {z:?} are not a box within {nx} x {nz} cells")));
+    }
+    Ok(())
+}

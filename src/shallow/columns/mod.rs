@@ -5,6 +5,7 @@
 
 pub mod grid;
 pub(in crate::shallow) mod per_column;
+pub(in crate::shallow) mod runs;
 pub(in crate::shallow) mod stacks;
 
 use std::ops::Range;
@@ -253,6 +254,11 @@ impl Columns {
         self.north[strip]
     }
 
+    /// One more than the highest layer of a strip; 0 without strips.
+    pub(in crate::shallow) fn layers(&self) -> usize {
+        self.strips.iter().map(|strip| strip.layer as usize + 1).max().unwrap_or(0)
+    }
+
     /// The strip at the same position of the next row, or [`NONE`].
     pub fn south(&self, strip: usize) -> u32 {
         self.south[strip]
@@ -318,6 +324,17 @@ impl Columns {
     /// The columns of a cell, from the lowest.
     pub fn of_cell(&self, cell: [usize; 2]) -> impl Iterator<Item = usize> + '_ {
         (0..).map_while(move |layer| self.column(cell, layer))
+    }
+
+    /// The column of a cell that contains a height (m) or is nearest to it, and how far off that is (m).
+    pub fn nearest(&self, cell: [usize; 2], height: f64) -> Option<(usize, f64)> {
+        let off = |index: usize| {
+            let [base, ceiling] =
+                [self.bases()[index], self.ceilings()[index]].map(|height| self.heights.metres(height));
+            (base - height).max(height - ceiling).max(0.0)
+        };
+        let all = self.of_cell(cell).map(|index| (index, off(index)));
+        all.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// b of every index (units), padded by 16 more numbers, so that SIMD loads may read past the last index.

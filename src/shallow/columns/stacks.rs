@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::grid::BOTTOMLESS;
 use super::{Columns, NONE, STRIP, Strip, strip_of};
+use crate::numeric::lists::{refill, reset};
 
 /// The strips of a row by block: 16 cells along x, with the strips of all layers above each other.
 #[derive(Debug, Clone, Default)]
@@ -27,10 +28,8 @@ impl Stacks {
     pub fn find(&mut self, strips: &[Strip], range: Range<usize>, blocks: usize) {
         let strips = strips[range.clone()].iter();
         self.layers = strips.clone().next_back().map_or(0, |last| last.layer as usize + 1);
-        self.counts.clear();
-        self.counts.resize(blocks, 0);
-        self.strips.clear();
-        self.strips.resize(blocks * self.layers, NONE);
+        reset(&mut self.counts, blocks, 0);
+        reset(&mut self.strips, blocks * self.layers, NONE);
         for (strip, position) in range.zip(strips) {
             self.counts[position.at as usize] = position.layer + 1;
             self.strips[position.at as usize * self.layers + position.layer as usize] = strip as u32;
@@ -41,8 +40,7 @@ impl Stacks {
     pub fn find_row(&mut self, columns: &Columns, row: usize) {
         let nx = columns.grid.size[0];
         self.find(columns.strips(), columns.row(row), nx.div_ceil(STRIP));
-        self.extents.clear();
-        self.extents.extend(self.strips.iter().map(|&strip| extent(columns, strip)));
+        refill(&mut self.extents, self.strips.iter().map(|&strip| extent(columns, strip)));
         let is_grounded = |at: usize| {
             let cells = (nx - at * STRIP).min(STRIP);
             self.of(at).first().is_some_and(|&strip| {

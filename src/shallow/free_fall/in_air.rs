@@ -1,5 +1,6 @@
 //! All liquid in the air.
 
+use std::iter::repeat_n;
 use std::ops::Range;
 
 use super::Falls;
@@ -7,7 +8,7 @@ use super::packet::Packet;
 use super::rivulets::Rivulets;
 use super::splash::Landing;
 use super::waiting::Waiting;
-use crate::shallow::columns::resize_part;
+use crate::numeric::lists::refill;
 use crate::shallow::scalars::shares::MOST;
 
 /// Capacity of the list of landings: this many columns for each packet.
@@ -60,8 +61,7 @@ impl Falling {
 
     /// Restores what [`Falling::packets`] and [`Falling::waiting`] returned; the number of links must be the same as then.
     pub fn set(&mut self, packets: impl Iterator<Item = Packet>, waiting: impl Iterator<Item = Waiting>) {
-        self.packets.clear();
-        self.packets.extend(packets);
+        refill(&mut self.packets, packets);
         self.waiting.iter_mut().zip(waiting).for_each(|(to, waiting)| *to = waiting);
     }
 
@@ -90,8 +90,6 @@ impl Falling {
 
     /// Changes the count of a range of links; nothing waits at the new ones.
     pub fn replace(&mut self, links: Range<usize>, count: usize) {
-        let new = links.start..links.start + count;
-        resize_part(&mut self.waiting, links, count, Waiting::default());
-        self.waiting[new].fill(Waiting::default());
+        self.waiting.splice(links, repeat_n(Waiting::default(), count));
     }
 }

@@ -6,7 +6,10 @@
 //! thick as it.
 
 use super::Droplet;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::geometry::DVec3;
+use crate::numeric::lists::{refill, reset};
+use crate::shallow::surface::layout::check_buffers;
 use crate::shallow::surface::{Counts, Indices, Layout, Up};
 
 /// Vertices and triangles of a ball: an icosahedron whose edges are halved.
@@ -64,7 +67,7 @@ struct Strand {
 #[derive(Debug)]
 pub struct Balls {
     /// Directions of a ball's vertices, and its triangles, counter-clockwise from outside.
-    vertices: Vec<[f64; 3]>,
+    vertices: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
     /// Radius of the ball's vertices, for which its volume is that of a ball of radius 1.
     size: f64,
@@ -109,12 +112,10 @@ impl Balls {
 
     /// Size of the mesh that [`Balls::build`] would write.
     pub fn count(&mut self, drops: &[Droplet]) -> Counts {
-        self.order.clear();
-        self.order.extend(0..drops.len() as u32);
+        refill(&mut self.order, 0..drops.len() as u32);
         self.order.sort_unstable_by_key(|&at| (drops[at as usize].source, drops[at as usize].number, at));
         self.strands.clear();
-        self.sums.clear();
-        self.sums.resize(drops.len(), [0.0; 3]);
+        reset(&mut self.sums, drops.len(), [0.0; 3]);
         for (position, &at) in self.order.iter().enumerate() {
             let drop = &drops[at as usize];
             let next = self.order.get(position + 1).copied().filter(|&next| {
@@ -130,13 +131,15 @@ impl Balls {
             }
             self.strands.push(strand);
         }
-        self.radii.clear();
-        self.radii.extend(drops.iter().zip(&self.sums).map(|(drop, &[radius, whole, count])| {
-            // In drops that are close together, the strand is no thicker than the drop.
-            let part = if count > 0.0 { whole / count } else { 0.0 };
-            let strand = if count > 0.0 { (radius / count).min(drop.radius) } else { 0.0 };
-            drop.radius + part * (strand - drop.radius)
-        }));
+        refill(
+            &mut self.radii,
+            drops.iter().zip(&self.sums).map(|(drop, &[radius, whole, count])| {
+                // In drops that are close together, the strand is no thicker than the drop.
+                let part = if count > 0.0 { whole / count } else { 0.0 };
+                let strand = if count > 0.0 { (radius / count).min(drop.radius) } else { 0.0 };
+                drop.radius + part * (strand - drop.radius)
+            }),
+        );
         of(drops.len(), self.strands.len())
     }
 
@@ -152,11 +155,11 @@ impl Balls {
         let (axes, scale) = (Axes::of(layout), layout.scale);
         let shape: [[f32; 3]; BALL[0]] =
             std::array::from_fn(|at| axes.turn(self.vertices[at]).map(|number| number as f32));
-        let turned = |vector: [f64; 3]| axes.turn(vector).map(|number| (number * scale) as f32);
+        let turned = |vector: DVec3| axes.turn(vector).map(|number| (number * scale) as f32);
         if let Some(to) = &mut target.positions {
             let (balls, strands) = parts(to, drops.len());
             for (to, (drop, radius)) in balls.zip(drops.iter().zip(&self.radii)) {
-                let (centre, radius) = (turned(drop.position), (radius * self.size * scale) as f32);
+                let (centre, radius) = (turned(drop.position.into()), (radius * self.size * scale) as f32);
                 for (to, normal) in to.iter_mut().zip(&shape) {
                     *to = [0, 1, 2].map(|n| centre[n] + radius * normal[n]);
                 }
@@ -170,8 +173,8 @@ impl Balls {
         }
         if let Some(to) = &mut target.velocities {
             let (balls, strands) = parts(to, drops.len());
-            balls.zip(drops).for_each(|(to, drop)| to.fill(turned(drop.velocity)));
-            self.each_corner(drops, strands, |_, _, drop| turned(drop.velocity));
+            balls.zip(drops).for_each(|(to, drop)| to.fill(turned(drop.velocity.into())));
+            self.each_corner(drops, strands, |_, _, drop| turned(drop.velocity.into()));
         }
         if let Some(to) = &mut target.drops {
             let (balls, strands) = to.split_at_mut(BALL[0] * drops.len());
@@ -195,7 +198,7 @@ impl Balls {
         &self,
         drops: &[Droplet],
         to: &mut [f32],
-        vector: impl Fn([f64; 3], [f64; 3], &Droplet) -> [f32; 3],
+        vector: impl Fn(DVec3, DVec3, &Droplet) -> [f32; 3],
     ) {
         let mut to = to.as_chunks_mut::<3>().0.iter_mut();
         for strand in &self.strands {
@@ -208,19 +211,19 @@ impl Balls {
                 }
                 (None, None) => (first, first.position, None, [own; 2]),
             };
-            let way = between(first.position, position);
-            let [aside, across] = edge.map_or_else(|| beside(way), |edge| beside_with(way, edge));
+            let [start, end] = [first.position, position].map(DVec3::from);
+            let way = end - start;
+            let [aside, across] = edge.map_or_else(|| beside(way), |edge| beside_with(way, edge.into()));
             // The middle lacks what has drained into the drops.
             let middle = [0, 1].map(|n| 0.5 * (own + axes[n]) * strand.whole);
-            let halfway = along(first.position, way, 0.5);
+            let halfway = start + 0.5 * way;
             for (drop, position, axes) in
-                [(first, first.position, [own; 2]), (first, halfway, middle), (last, position, axes)]
+                [(first, start, [own; 2]), (first, halfway, middle), (last, end, axes)]
             {
                 let axes = axes.map(|radius| radius * AROUND);
                 for ([cos, sin], to) in HEXAGON.into_iter().zip(&mut to) {
-                    let off = [0, 1, 2].map(|n| axes[0] * cos * aside[n] + axes[1] * sin * across[n]);
-                    let normal = [0, 1, 2].map(|n| cos * aside[n] + sin * across[n]);
-                    *to = vector(normal, along(position, off, 1.0), drop);
+                    let off = axes[0] * cos * aside + axes[1] * sin * across;
+                    *to = vector(cos * aside + sin * across, position + off, drop);
                 }
             }
         }
@@ -260,7 +263,7 @@ impl Strand {
             Some(next) => (next.position, 0.5 * (drop.volume + next.volume)),
             None => (drop.lip?.position, drop.volume),
         };
-        let long = length(between(drop.position, position));
+        let long = (DVec3::from(position) - DVec3::from(drop.position)).norm();
         if long <= 0.0 {
             return None;
         }
@@ -274,30 +277,10 @@ impl Target<'_> {
     /// Whether the mesh fits.
     fn check(&self, counts: &Counts) -> Result<()> {
         let vectors =
-            [("positions", &self.positions), ("normals", &self.normals), ("velocities", &self.velocities)];
-        let vectors =
-            vectors.map(|(name, out)| (name, out.as_ref().map(|out| out.len()), 3 * counts.vertices));
-        let indices = match &self.indices {
-            Indices::None => None,
-            Indices::U16(out) => Some(out.len()),
-            Indices::U32(out) => Some(out.len()),
-        };
-        let drops = self.drops.as_ref().map(|out| out.len());
-        let others = [("drops", drops, counts.vertices), ("indices", indices, counts.indices)];
-        for (name, room, needed) in vectors.into_iter().chain(others) {
-            if let Some(room) = room.filter(|room| *room < needed) {
-                return Err(Error::argument(format!(
-                    "{name} has room for {room} numbers, and the drops have {needed}"
-                )));
-            }
-        }
-        if matches!(self.indices, Indices::U16(_)) && counts.vertices > 1 << 16 {
-            return Err(Error::argument(format!(
-                "{} vertices are too many for indices of 16 bits: take those of 32",
-                counts.vertices
-            )));
-        }
-        Ok(())
+            [("positions", &self.positions), ("normals", &self.normals), ("velocities", &self.velocities)]
+                .map(|(name, out)| (name, out.as_deref().map(<[f32]>::len), 3 * counts.vertices));
+        let drops = ("drops", self.drops.as_deref().map(<[u32]>::len), counts.vertices);
+        check_buffers("drops have", counts, vectors.into_iter().chain([drops]), &self.indices)
     }
 }
 
@@ -319,7 +302,8 @@ impl Axes {
         Self { z_up, sign: if layout.left_handed != z_up { -1.0 } else { 1.0 } }
     }
 
-    fn turn(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+    fn turn(&self, vector: DVec3) -> [f64; 3] {
+        let [x, y, z] = vector.into();
         if self.z_up { [x, self.sign * z, y] } else { [x, y, self.sign * z] }
     }
 }
@@ -330,57 +314,36 @@ const HEXAGON: [[f64; 2]; SIDES] = {
     [[1.0, 0.0], [0.5, SIN], [-0.5, SIN], [-1.0, 0.0], [-0.5, -SIN], [0.5, -SIN]]
 };
 
-fn between(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|n| b[n] - a[n])
-}
-
-fn along(from: [f64; 3], direction: [f64; 3], distance: f64) -> [f64; 3] {
-    [0, 1, 2].map(|n| from[n] + distance * direction[n])
-}
-
-fn length([x, y, z]: [f64; 3]) -> f64 {
-    (x * x + y * y + z * z).sqrt()
-}
-
-fn unit(vector: [f64; 3]) -> [f64; 3] {
-    let length = length(vector);
-    vector.map(|number| number / length)
-}
-
-fn cross([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
-    [b * z - c * y, c * x - a * z, a * y - b * x]
-}
-
 /// Two unit vectors perpendicular to a direction; right-handed, with the direction last.
-fn beside(direction: [f64; 3]) -> [[f64; 3]; 2] {
-    let is_steep = direction[0].abs() < 0.7 * length(direction);
-    beside_with(direction, if is_steep { [1.0, 0.0, 0.0] } else { [0.0, 0.0, 1.0] })
+fn beside(direction: DVec3) -> [DVec3; 2] {
+    let is_steep = direction.x.abs() < 0.7 * direction.norm();
+    beside_with(direction, if is_steep { DVec3::x() } else { DVec3::z() })
 }
 
 /// As [`beside`]; the first is close to another direction.
-fn beside_with(direction: [f64; 3], other: [f64; 3]) -> [[f64; 3]; 2] {
-    let direction = unit(direction);
-    let across = unit(cross(direction, other));
-    [cross(across, direction), across]
+fn beside_with(direction: DVec3, other: DVec3) -> [DVec3; 2] {
+    let direction = direction.normalize();
+    let across = direction.cross(&other).normalize();
+    [across.cross(&direction), across]
 }
 
 /// Volume of the tetrahedron of a triangle and the origin.
-fn volume([a, b, c]: [[f64; 3]; 3]) -> f64 {
-    let normal = cross(b, c);
-    (0..3).map(|n| a[n] * normal[n]).sum::<f64>() / 6.0
+fn volume([a, b, c]: [DVec3; 3]) -> f64 {
+    a.dot(&b.cross(&c)) / 6.0
 }
 
 /// Directions and triangles of a ball.
-fn ball() -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+fn ball() -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let golden = 0.5 * (1.0 + 5f64.sqrt());
     let mut vertices = Vec::with_capacity(BALL[0]);
     for one in [-1.0, 1.0] {
         for long in [-golden, golden] {
-            vertices.extend([[0.0, one, long], [one, long, 0.0], [long, 0.0, one]].map(unit));
+            let corners = [[0.0, one, long], [one, long, 0.0], [long, 0.0, one]];
+            vertices.extend(corners.map(|corner| DVec3::from(corner).normalize()));
         }
     }
     // The corners of a face are neighbours of each other.
-    let near = |a: usize, b: usize| length(between(vertices[a], vertices[b])) < 1.2;
+    let near = |a: usize, b: usize| (vertices[b] - vertices[a]).norm() < 1.2;
     let mut faces = Vec::with_capacity(20);
     for a in 0..12 {
         for b in (a + 1..12).filter(|&b| near(a, b)) {
@@ -394,7 +357,7 @@ fn ball() -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
     for face in faces {
         let middles: [u32; 3] = std::array::from_fn(|side| {
             let ends = [face[side], face[(side + 1) % 3]].map(|at| vertices[at]);
-            let middle = unit(along(ends[0], ends[1], 1.0));
+            let middle = (ends[0] + ends[1]).normalize();
             // An edge has two faces, whose midpoint sums are the same in either order.
             let at = vertices.iter().position(|vertex| *vertex == middle).unwrap_or(vertices.len());
             if at == vertices.len() {
@@ -423,8 +386,7 @@ mod tests {
         assert!(edges.windows(2).all(|two| two[0] != two[1]));
         assert!(edges.iter().all(|&[a, b]| edges.binary_search(&[b, a]).is_ok()));
         let size = Balls::default().size;
-        let all: f64 =
-            triangles.iter().map(|t| volume(t.map(|at| vertices[at as usize].map(|n| n * size)))).sum();
+        let all: f64 = triangles.iter().map(|t| volume(t.map(|at| vertices[at as usize] * size))).sum();
         assert!((all - 4.0 / 3.0 * std::f64::consts::PI).abs() < 1e-12, "{size} {all}");
     }
 }

@@ -6,6 +6,7 @@
 //! equal edges stay separate: a turned or mirrored scene has the same rivulets.
 
 use super::waiting::{Waiting, add};
+use crate::numeric::lists::refill;
 use crate::shallow::columns::Columns;
 use crate::shallow::pipes::Links;
 use crate::shallow::pipes::side::Side;
@@ -78,8 +79,7 @@ impl Rivulets {
             });
         }
         self.lips.sort_unstable_by_key(|lip| (lip.cell, lip.link));
-        self.order.clear();
-        self.order.extend(0..self.lips.len() as u32);
+        refill(&mut self.order, 0..self.lips.len() as u32);
         let lips = &self.lips;
         self.order.sort_unstable_by_key(|&at| std::cmp::Reverse(lips[at as usize].strength));
         let step = (grid.cell / columns.heights.unit).min(f64::from(i32::MAX / 2)) as i32;

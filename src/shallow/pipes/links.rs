@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use super::side::Side;
-use crate::shallow::columns::{Columns, NONE, STRIP, resize_part};
+use crate::numeric::lists::reset;
+use crate::shallow::columns::{Columns, NONE, STRIP};
 
 /// The pipes that are not regular, by the row of their owner.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -40,8 +41,7 @@ impl Links {
     /// Lists the columns with links.
     pub(in crate::shallow) fn list_columns(&mut self, columns: &Columns, ends: &mut Ends) {
         let all = || self.from.iter().chain(self.to.iter().filter(|&&to| to != NONE)).copied();
-        ends.marks.clear();
-        ends.marks.resize(columns.strips().len(), 0);
+        reset(&mut ends.marks, columns.strips().len(), 0);
         all().for_each(|end| ends.marks[end as usize / STRIP] |= 1 << (end as usize % STRIP));
         self.columns.clear();
         self.column_rows.clear();
@@ -58,8 +58,7 @@ impl Links {
             }
             self.column_rows.push(self.columns.len() as u32);
         }
-        ends.counts.clear();
-        ends.counts.resize(self.columns.len(), 0);
+        reset(&mut ends.counts, self.columns.len(), 0);
         for end in all() {
             let rank = ends.rank(end);
             ends.counts[rank] += 1;
@@ -70,27 +69,21 @@ impl Links {
     /// Replaces the links of some rows. Column indices in the rows behind grow by `shift`, modulo 2^32.
     pub(in crate::shallow) fn replace_rows(&mut self, rows: Range<usize>, new: &Self, shift: u32) {
         let old = self.rows[rows.start] as usize..self.rows[rows.end] as usize;
-        let (first, len) = (old.start, new.len());
-        resize_part(&mut self.from, old.clone(), len, 0);
-        resize_part(&mut self.to, old.clone(), len, 0);
-        resize_part(&mut self.sides, old.clone(), len, Side::East);
-        resize_part(&mut self.open, old.clone(), len, 0.0);
-        resize_part(&mut self.level, old.clone(), len, 0);
-        let part = first..first + len;
-        self.from[part.clone()].copy_from_slice(&new.from);
-        self.to[part.clone()].copy_from_slice(&new.to);
-        self.sides[part.clone()].copy_from_slice(&new.sides);
-        self.open[part.clone()].copy_from_slice(&new.open);
-        self.level[part.clone()].copy_from_slice(&new.level);
+        self.from.splice(old.clone(), new.from.iter().copied());
+        self.to.splice(old.clone(), new.to.iter().copied());
+        self.sides.splice(old.clone(), new.sides.iter().copied());
+        self.open.splice(old.clone(), new.open.iter().copied());
+        self.level.splice(old.clone(), new.level.iter().copied());
+        let (first, end) = (old.start, old.start + new.len());
         if shift != 0 {
-            let behind = [&mut self.from[part.end..], &mut self.to[part.end..]];
+            let behind = [&mut self.from[end..], &mut self.to[end..]];
             let ends = behind.into_iter().flatten().filter(|end| **end != NONE);
             ends.for_each(|end| *end = end.wrapping_add(shift));
         }
         for (row, end) in rows.clone().zip(&new.rows[1..]) {
             self.rows[row + 1] = first as u32 + end;
         }
-        let grows = (part.end as u32).wrapping_sub(old.end as u32);
+        let grows = (end as u32).wrapping_sub(old.end as u32);
         self.rows[rows.end + 1..].iter_mut().for_each(|end| *end = end.wrapping_add(grows));
     }
 

@@ -34,9 +34,9 @@ impl Rises {
         self.z.resize(len, 0);
         let rises = self;
         if steepest == i32::MAX {
-            dispatch!(at most avx2: rise_row(columns: &Columns, row: usize, rises: &mut Rises));
+            dispatch!(at most avx2: rise::<false>(columns: &Columns, row: usize, rises: &mut Rises, steepest: i32));
         } else {
-            dispatch!(at most avx2: rise_row_between_walls(columns: &Columns, row: usize, rises: &mut Rises, steepest: i32));
+            dispatch!(at most avx2: rise::<true>(columns: &Columns, row: usize, rises: &mut Rises, steepest: i32));
         }
     }
 }
@@ -106,16 +106,6 @@ fn walls([before, behind]: [i32; 2], steepest: i32) -> [i32; 2] {
     let is_steep = [before, behind].map(|step| -i32::from(step.abs() > steepest));
     let goes_on = is_steep[0] & is_steep[1] & !((before ^ behind) >> 31);
     is_steep.map(|steep| steep & !goes_on)
-}
-
-#[inline(always)]
-fn rise_row(columns: &Columns, row: usize, rises: &mut Rises) {
-    rise::<false>(columns, row, rises, i32::MAX);
-}
-
-#[inline(always)]
-fn rise_row_between_walls(columns: &Columns, row: usize, rises: &mut Rises, steepest: i32) {
-    rise::<true>(columns, row, rises, steepest);
 }
 
 /// Twice the rise over open sides, from the steps over both and masks of those that are open.

@@ -8,6 +8,7 @@
 
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
+use crate::numeric::lists::check_each;
 use crate::shallow::columns::Columns;
 use crate::shallow::columns::grid::Grid;
 use crate::shallow::pipes::side::Side;
@@ -69,14 +70,8 @@ impl Shallow {
             return Err(Error::argument(format!("density = {density} kg/m3 is not positive and finite")));
         }
         let bodies = self.bodies();
-        for (what, given) in [("velocities", velocities.len()), ("loads", out.len())] {
-            if given != bodies.len() {
-                let count = bodies.len();
-                return Err(Error::argument(format!(
-                    "{given} {what} are not one for each of {count} bodies"
-                )));
-            }
-        }
+        check_each(velocities.len(), "velocities", bodies.len(), "bodies")?;
+        check_each(out.len(), "loads", bodies.len(), "bodies")?;
         if let Some(body) = velocities.iter().position(|velocity| !velocity.iter().all(|v| v.is_finite())) {
             return Err(Error::argument(format!("the velocity of body {body} is not finite")));
         }

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::snapshot::Snapshot;
 use crate::error::{Error, Result};
+use crate::numeric::lists::check_room;
 use crate::shallow::columns::grid::Grid;
 use crate::shallow::columns::{Columns, STRIP};
 use crate::shallow::scalars::check_scalar;
@@ -74,7 +75,7 @@ impl View<'_> {
     /// # Errors
     /// As [`View::volume`], naming the box; `Argument` also if there is not one output for each. Nothing is written.
     pub fn volumes(&self, boxes: &[[[f64; 3]; 2]], out: &mut [f64]) -> Result<()> {
-        check_room("volumes", out.len(), "boxes", boxes.len())?;
+        check_room(out.len(), "volumes", boxes.len(), "boxes")?;
         for (at, [low, high]) in boxes.iter().enumerate() {
             check_box(*low, *high).map_err(|error| Error::argument(format!("box {at}: {error}")))?;
         }
@@ -109,7 +110,7 @@ impl View<'_> {
 
     /// Count of layers: the maximum number of columns in a cell.
     pub fn layers(&self) -> usize {
-        self.columns.strips().iter().map(|strip| strip.layer as usize + 1).max().unwrap_or(0)
+        self.columns.layers()
     }
 
     /// The column at a point (m): in its cell, the column that contains the point between ground and ceiling, else the nearest one, or the
@@ -141,7 +142,7 @@ impl View<'_> {
     /// # Errors
     /// `Argument`: there is not one output for each; nothing is written.
     pub fn read(&self, points: &[[f64; 3]], out: &mut [Option<Reading>]) -> Result<()> {
-        check_room("readings", out.len(), "points", points.len())?;
+        check_room(out.len(), "readings", points.len(), "points")?;
         out.iter_mut().zip(points).for_each(|(out, point)| *out = self.at(*point));
         Ok(())
     }
@@ -224,12 +225,4 @@ fn check_box(low: [f64; 3], high: [f64; 3]) -> Result<()> {
         return Ok(());
     }
     Err(Error::argument(format!("a box from {low:?} to {high:?} m has no inside")))
-}
-
-fn check_room(what: &str, room: usize, of: &str, count: usize) -> Result<()> {
-    if room == count {
-        Ok(())
-    } else {
-        Err(Error::argument(format!("room for {room} {what} is not that of {count} {of}")))
-    }
 }

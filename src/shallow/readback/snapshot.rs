@@ -2,13 +2,14 @@
 
 use std::ops::Range;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::numeric::cpu::dispatch;
+use crate::numeric::lists::{check_room, refill, reset};
+use crate::shallow::columns::runs::{fill_runs, runs};
 use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::free_fall::Droplet;
 use crate::shallow::scalars::{MOST, find_concentrations};
 use crate::shallow::solver::Flow;
-use crate::shallow::solver::active::runs;
 use crate::shallow::system::Shallow;
 
 /// The liquid after a frame.
@@ -52,12 +53,9 @@ impl Snapshot {
         if self.terrain != shallow.identity.number() {
             self.terrain = shallow.identity.number();
             self.columns.clone_from(&shallow.columns);
-            self.active.clear();
-            self.active.resize(self.columns.strips().len(), false);
-            self.depth.clear();
-            self.depth.resize(self.columns.len(), 0);
-            self.velocity.clear();
-            self.velocity.resize(self.columns.len(), [0.0; 2]);
+            reset(&mut self.active, self.columns.strips().len(), false);
+            reset(&mut self.depth, self.columns.len(), 0);
+            reset(&mut self.velocity, self.columns.len(), [0.0; 2]);
             self.concentrations.iter_mut().for_each(Vec::clear);
         }
         let amounts = &shallow.flow.amounts;
@@ -79,8 +77,7 @@ impl Snapshot {
         }
         self.clear(end..self.active.len());
         self.active.copy_from_slice(shallow.flow.active());
-        self.drops.clear();
-        self.drops.extend(shallow.drops());
+        refill(&mut self.drops, shallow.drops());
         self.time = shallow.time;
     }
 
@@ -143,20 +140,8 @@ impl Shallow {
     /// # Errors
     /// `Argument`: there is not one output for each index.
     pub fn velocities(&self, out: &mut [[f32; 2]]) -> Result<()> {
-        let len = self.columns.len();
-        if out.len() != len {
-            return Err(Error::argument(format!(
-                "room for {} velocities is not that of {len} indices",
-                out.len()
-            )));
-        }
-        let mut end = 0;
-        for run in runs(self.flow.active()) {
-            out[end * STRIP..run.start * STRIP].fill([0.0; 2]);
-            end = run.end;
-            find_velocities(self, run.clone(), &mut out[run.start * STRIP..run.end * STRIP]);
-        }
-        out[end * STRIP..].fill([0.0; 2]);
+        check_room(out.len(), "velocities", self.columns.len(), "indices")?;
+        fill_runs(self.flow.active(), out, |strips, out| find_velocities(self, strips, out));
         Ok(())
     }
 }

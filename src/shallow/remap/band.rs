@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::numeric::lists::refill;
 use crate::shallow::columns::{Columns, STRIP, Strip};
 use crate::shallow::scalars::MOST;
 use crate::shallow::solver::Flow;
@@ -35,24 +36,22 @@ impl Band {
     pub fn save(&mut self, columns: &Columns, flow: &Flow, rows: Range<usize>) {
         let strips = columns.row(rows.start).start..columns.row(rows.end - 1).end;
         self.first = strips.start;
-        self.starts.clear();
-        self.starts.extend(rows.clone().map(|row| (columns.row(row).start - strips.start) as u32));
+        refill(&mut self.starts, rows.clone().map(|row| (columns.row(row).start - strips.start) as u32));
         self.starts.push(strips.len() as u32);
-        copy(&mut self.strips, &columns.strips()[strips.clone()]);
-        self.present.clear();
-        self.present.extend(strips.clone().map(|strip| columns.present(strip)));
+        columns.strips()[strips.clone()].clone_into(&mut self.strips);
+        refill(&mut self.present, strips.clone().map(|strip| columns.present(strip)));
         let indices = strips.start * STRIP..strips.end * STRIP;
-        copy(&mut self.base, &columns.bases()[indices.clone()]);
-        copy(&mut self.ceiling, &columns.ceilings()[indices.clone()]);
-        copy(&mut self.under, &columns.unders()[indices.clone()]);
-        copy(&mut self.depth, &flow.depths()[indices.clone()]);
+        columns.bases()[indices.clone()].clone_into(&mut self.base);
+        columns.ceilings()[indices.clone()].clone_into(&mut self.ceiling);
+        columns.unders()[indices.clone()].clone_into(&mut self.under);
+        flow.depths()[indices.clone()].clone_into(&mut self.depth);
         for axis in [0, 1] {
-            copy(&mut self.flux[axis], &flow.flux[axis][indices.clone()]);
-            copy(&mut self.left[axis], &flow.left[axis][indices.clone()]);
+            flow.flux[axis][indices.clone()].clone_into(&mut self.flux[axis]);
+            flow.left[axis][indices.clone()].clone_into(&mut self.left[axis]);
         }
-        copy(&mut self.over, &flow.network.over()[indices.clone()]);
+        flow.network.over()[indices.clone()].clone_into(&mut self.over);
         for (own, amounts) in self.amounts.iter_mut().zip(&flow.amounts.amounts) {
-            copy(own, if amounts.is_empty() { &[] } else { &amounts[indices.clone()] });
+            amounts.get(indices.clone()).unwrap_or_default().clone_into(own);
         }
         self.rows = rows;
     }
@@ -67,9 +66,4 @@ impl Band {
     pub fn range(&self) -> Range<usize> {
         self.first..self.first + self.strips.len()
     }
-}
-
-fn copy<T: Copy>(to: &mut Vec<T>, from: &[T]) {
-    to.clear();
-    to.extend_from_slice(from);
 }

@@ -4,6 +4,7 @@
 //! next column with room; the same happens to the liquid of a column that has vanished, from the height where it stood. Liquid that finds
 //! no room above goes down.
 
+use crate::numeric::lists::refill;
 use crate::shallow::columns::grid::BOTTOMLESS;
 use crate::shallow::scalars::MOST;
 use crate::shallow::scalars::shares::take;
@@ -121,8 +122,7 @@ impl Cell {
     fn align(&mut self) {
         let (rows, width) = (self.old.len(), self.new.len() + 1);
         let way = |old: &Old, new: &New| 2 * (i64::from(old.base) - i64::from(new.base)).abs();
-        self.costs.clear();
-        self.costs.extend((0..width as i64).map(|at| at * self.reach));
+        refill(&mut self.costs, (0..width as i64).map(|at| at * self.reach));
         for (row, old) in self.old.iter().enumerate() {
             let before = row * width;
             self.costs.push((row as i64 + 1) * self.reach);

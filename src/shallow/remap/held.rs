@@ -2,6 +2,7 @@
 //!
 //! Shares are whole units and do not depend on an order, so that a mirrored scene gets mirrored shares.
 
+use crate::numeric::lists::refill;
 use crate::shallow::columns::Columns;
 use crate::shallow::columns::grid::BOTTOMLESS;
 use crate::shallow::scalars::MOST;
@@ -128,8 +129,7 @@ impl Held {
 
     /// Restores the parcels that [`Held::parcels`] returned.
     pub fn set(&mut self, parcels: impl Iterator<Item = Parcel>) {
-        self.parcels.clear();
-        self.parcels.extend(parcels);
+        refill(&mut self.parcels, parcels);
     }
 
     /// Gives waiting liquid to columns with room: first of its own cell, then of the four beside it in equal shares. Liquid from a cell
@@ -261,8 +261,7 @@ fn put(columns: &Columns, flow: &mut Flow, order: &mut Vec<u32>, parcel: &mut Pa
     if is_void(columns, parcel.cell, parcel.height) {
         return;
     }
-    order.clear();
-    order.extend(columns.of_cell(position(columns, parcel.cell)).map(|column| column as u32));
+    refill(order, columns.of_cell(position(columns, parcel.cell)).map(|column| column as u32));
     let first = order.partition_point(|&column| columns.ceilings()[column as usize] <= parcel.height);
     let (below, above) = order.split_at(first);
     for &column in above.iter().chain(below.iter().rev()) {

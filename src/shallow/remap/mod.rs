@@ -19,6 +19,7 @@ use std::ops::Range;
 
 use super::Shallow;
 use super::columns::STRIP;
+use super::columns::grid::check_cells;
 use super::pipes::pipe_rules::Rules;
 use super::terrain::Solids;
 use super::terrain::identity::Identity;
@@ -74,13 +75,7 @@ impl Shallow {
         solids: impl Fn(usize) -> &'a [Solid],
     ) -> Result<Moved> {
         let grid = self.columns.grid;
-        let [nx, nz] = grid.size;
-        let [x, z] = &cells;
-        if x.start > x.end || z.start > z.end || x.end > nx || z.end > nz {
-            return Err(Error::argument(format!(
-                "cells {x:?} x {z:?} are not a box within {nx} x {nz} cells"
-            )));
-        }
+        check_cells(&cells, grid.size)?;
         self.remap.dirty.clear(grid.size);
         self.remap.dirty.mark(&cells);
         if self.remap.ground.bodies().is_empty() {

@@ -1,6 +1,7 @@
 //! Which former column each column was.
 
 use super::band::Band;
+use crate::numeric::lists::reset;
 use crate::shallow::columns::{NONE, STRIP};
 
 /// The columns of a band, and those around it whose indices shift.
@@ -27,8 +28,7 @@ impl Origins {
     pub fn begin(&mut self, band: &Band, count: usize) {
         self.first = band.first;
         self.counts = [band.strips.len(), count];
-        self.strips.clear();
-        self.strips.resize(count, (NONE, 0));
+        reset(&mut self.strips, count, (NONE, 0));
         self.odd.clear();
     }
 

@@ -9,10 +9,8 @@
 //! | states of the fine and of the coarse liquid, as in [`super`] | |
 //! | hash of everything above | [`SEAL`] |
 
-use xxhash_rust::xxh3::xxh3_128;
-
-use super::encoding::{Put, SUMS, part, parts, refused};
-use super::{LAST, MOST_FLUX, SEAL, Saved, is_over};
+use super::encoding::{Beginning, Put, SEAL, SUMS, open, part, parts, refused, seal};
+use super::{LAST, MOST_FLUX, Saved, is_over};
 use crate::error::{Error, Result};
 use crate::numeric::bytes::Reader;
 use crate::shallow::Shallow;
@@ -21,8 +19,12 @@ use crate::shallow::scalars::MOST;
 use crate::shallow::two_level::rests::Load;
 use crate::shallow::two_level::{Detail, check_near};
 
-const MAGIC: [u8; 8] = *b"frz shld";
-const VERSION: u32 = 1;
+const BEGINNING: Beginning = Beginning {
+    magic: *b"frz shld",
+    version: 1,
+    length_at: 16,
+    of: "a shallow liquid in cells of two sizes",
+};
 /// Bytes of the header.
 const HEADER: usize = 72;
 
@@ -106,12 +108,11 @@ impl Detail {
 
     fn write(&self, out: &mut [u8]) {
         let size = out.len();
-        let (body, seal) = out.split_at_mut(size - SEAL);
-        let mut to = Put(&mut *body);
+        let mut to = Put(&mut out[..size - SEAL]);
         let sizes = [self.fine.save_size(), self.coarse.save_size()];
         let [x, z] = &self.near;
-        to.bytes(&MAGIC);
-        to.numbers(&[VERSION, self.scalars().len() as u32], u32::to_le_bytes);
+        to.bytes(&BEGINNING.magic);
+        to.numbers(&[BEGINNING.version, self.scalars().len() as u32], u32::to_le_bytes);
         to.bytes(&(size as u64).to_le_bytes());
         to.numbers(&[x.start, x.end, z.start, z.end].map(|at| at as u32), u32::to_le_bytes);
         let counts = [self.seam.numbers().len(), self.rest.iter().count()];
@@ -128,7 +129,7 @@ impl Detail {
             liquid.write(&super::Counts::of(liquid), to.next(size));
         }
         debug_assert!(to.0.is_empty());
-        seal.copy_from_slice(&xxh3_128(body).to_le_bytes());
+        seal(out);
     }
 }
 
@@ -151,28 +152,10 @@ struct Both<'a> {
 
 impl<'a> Both<'a> {
     fn read(bytes: &'a [u8]) -> Result<Self> {
-        let Some(header) = bytes.first_chunk::<HEADER>().filter(|header| header.starts_with(&MAGIC)) else {
-            let is_begun = bytes.len() < HEADER && bytes.starts_with(&MAGIC);
-            return Err(refused(if is_begun {
-                "is cut short"
-            } else {
-                "is not of a shallow liquid in cells of two sizes"
-            }));
-        };
-        let mut from = Reader::new(&header[8..]);
-        let version = from.u32()?;
-        if version != VERSION {
-            return Err(refused(&format!("has format {version}, and this library reads {VERSION}")));
-        }
+        let (header, body) = open::<HEADER>(bytes, &BEGINNING)?;
+        let mut from = Reader::new(&header[12..]);
         let scalars = from.u32()? as usize;
-        let length = u64::from_le_bytes(from.take()?);
-        if length > bytes.len() as u64 {
-            return Err(refused("is cut short"));
-        }
-        let (body, seal) = bytes.split_at(bytes.len() - SEAL);
-        if length < bytes.len() as u64 || xxh3_128(body).to_le_bytes() != *seal {
-            return Err(refused("is damaged"));
-        }
+        from.take::<8>()?;
         let mut count = || from.u32().map(|count| count as usize);
         let near = [count()?..count()?, count()?..count()?];
         let [pipes, rests] = [count()?, count()?];
@@ -183,7 +166,7 @@ impl<'a> Both<'a> {
         }
         let fixed = (HEADER + rest_bytes(scalars) * rests + 8 * pipes + SEAL) as u64;
         let all = sizes[0].checked_add(sizes[1]).and_then(|sum| sum.checked_add(fixed));
-        if all != Some(length) {
+        if all != Some(bytes.len() as u64) {
             return Err(refused("is damaged"));
         }
         let mut from = Reader::new(&body[HEADER..]);

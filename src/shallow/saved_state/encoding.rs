@@ -2,6 +2,8 @@
 
 use std::ops::RangeInclusive;
 
+use xxhash_rust::xxh3::xxh3_128;
+
 use crate::error::{Error, Result};
 use crate::numeric::bytes::Reader;
 
@@ -44,6 +46,50 @@ pub(in crate::shallow::saved_state) fn parts<'a, const N: usize>(
 /// Some bytes of an element.
 pub(in crate::shallow::saved_state) fn part<const N: usize>(element: &[u8], at: usize) -> [u8; N] {
     std::array::from_fn(|byte| element[at + byte])
+}
+
+/// Bytes of the hash at the end of a state.
+pub(in crate::shallow::saved_state) const SEAL: usize = 16;
+
+/// How a kind of state begins.
+pub(in crate::shallow::saved_state) struct Beginning {
+    pub magic: [u8; 8],
+    pub version: u32,
+    /// Where the header has the length of the state.
+    pub length_at: usize,
+    /// What states of this kind are of.
+    pub of: &'static str,
+}
+
+/// Checks the beginning, the length and the hash of a state; returns its header, and all of it without the hash.
+pub(in crate::shallow::saved_state) fn open<'a, const HEADER: usize>(
+    bytes: &'a [u8],
+    kind: &Beginning,
+) -> Result<(&'a [u8; HEADER], &'a [u8])> {
+    let Beginning { magic, version: wanted, length_at, of } = kind;
+    let Some(header) = bytes.first_chunk::<HEADER>().filter(|header| header.starts_with(magic)) else {
+        let is_begun = bytes.len() < HEADER && bytes.starts_with(magic);
+        return Err(if is_begun { refused("is cut short") } else { refused(&format!("is not of {of}")) });
+    };
+    let version = Reader::new(&header[8..]).u32()?;
+    if version != *wanted {
+        return Err(refused(&format!("has format {version}, and this library reads {wanted}")));
+    }
+    let length = u64::from_le_bytes(part(header, *length_at));
+    if length > bytes.len() as u64 {
+        return Err(refused("is cut short"));
+    }
+    let (body, seal) = bytes.split_at(bytes.len() - SEAL);
+    if length < bytes.len() as u64 || xxh3_128(body).to_le_bytes() != *seal {
+        return Err(refused("is damaged"));
+    }
+    Ok((header, body))
+}
+
+/// Writes the hash of a state at its end.
+pub(in crate::shallow::saved_state) fn seal(state: &mut [u8]) {
+    let (body, seal) = state.split_at_mut(state.len() - SEAL);
+    seal.copy_from_slice(&xxh3_128(body).to_le_bytes());
 }
 
 pub(in crate::shallow::saved_state) fn refused(what: &str) -> Error {

@@ -2,21 +2,19 @@
 
 use std::ops::Range;
 
-use super::encoding::Put;
+use super::encoding::{Beginning, Put, SEAL};
 use crate::error::Result;
 use crate::numeric::bytes::Reader;
 use crate::shallow::columns::STRIP;
+use crate::shallow::columns::runs::runs;
 use crate::shallow::free_fall::{LIP, PACKET};
 use crate::shallow::scalars::amounts::ACCOUNTS;
-use crate::shallow::solver::active::runs;
 use crate::shallow::system::Shallow;
 
-pub(super) const MAGIC: [u8; 8] = *b"frz shal";
-pub(super) const VERSION: u32 = 2;
+pub(super) const BEGINNING: Beginning =
+    Beginning { magic: *b"frz shal", version: 2, length_at: 32, of: "a shallow liquid" };
 /// Bytes of the header.
 pub(super) const HEADER: usize = 168;
-/// Bytes of the hash.
-pub(super) const SEAL: usize = 16;
 /// Bytes of a strip's share of an array.
 pub(super) const SHARE: usize = 4 * STRIP;
 /// Arrays by column index: depths, two of fluxes, two of remainders.
@@ -110,8 +108,8 @@ impl Header {
             self.counts;
         let counts = [runs, strips, rows, points, links, heads, parcels, packets, lips, scalars]
             .map(|count| count as u32);
-        to.bytes(&MAGIC);
-        to.numbers(&[VERSION, self.border], u32::to_le_bytes);
+        to.bytes(&BEGINNING.magic);
+        to.numbers(&[BEGINNING.version, self.border], u32::to_le_bytes);
         to.bytes(&self.terrain);
         to.bytes(&(self.counts.size() as u64).to_le_bytes());
         to.numbers(&counts, u32::to_le_bytes);

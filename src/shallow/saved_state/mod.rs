@@ -25,21 +25,19 @@ mod scalars;
 
 use std::ops::{Range, RangeInclusive};
 
-use xxhash_rust::xxh3::xxh3_128;
-
 use super::columns::grid::{BOTTOMLESS, TOP};
+use super::columns::runs::runs;
 use super::columns::{Columns, STRIP};
 use super::free_fall::{LIP, PACKET, Packet, Waiting};
 use super::pipes::Border;
 use super::remap::Parcel;
-use super::solver::active::runs;
 use super::sources::Kind;
 use super::system::Shallow;
 use crate::error::{Error, Result};
 use crate::numeric::bytes::Reader;
 use crate::numeric::cpu::dispatch;
-use encoding::{Put, SUMS, get, part, parts, refused};
-use header::{ARRAYS, Counts, HEADER, Header, MAGIC, SEAL, SHARE, VERSION, heads};
+use encoding::{Put, SEAL, SUMS, get, open, part, parts, refused, seal};
+use header::{ARRAYS, BEGINNING, Counts, HEADER, Header, SHARE, heads};
 use scalars::Scalars;
 
 /// Upper bound of a flux (units a step): K limits transfers to the donor's depth.
@@ -115,8 +113,7 @@ impl Shallow {
     }
 
     fn write(&self, counts: &Counts, out: &mut [u8]) {
-        let (body, seal) = out.split_at_mut(counts.size() - SEAL);
-        let mut to = Put(&mut *body);
+        let mut to = Put(&mut out[..counts.size() - SEAL]);
         self.header(counts).put(&mut to);
         let flow = &self.flow;
         for run in runs(flow.active()) {
@@ -144,7 +141,7 @@ impl Shallow {
         }
         scalars::put(self, &mut to);
         debug_assert!(to.0.is_empty());
-        seal.copy_from_slice(&xxh3_128(body).to_le_bytes());
+        seal(&mut out[..counts.size()]);
     }
 
     fn header(&self, counts: &Counts) -> Header {
@@ -183,22 +180,7 @@ struct Saved<'a> {
 
 impl<'a> Saved<'a> {
     fn read(bytes: &'a [u8]) -> Result<Self> {
-        let Some(header) = bytes.first_chunk::<HEADER>().filter(|header| header.starts_with(&MAGIC)) else {
-            let is_begun = bytes.len() < HEADER && bytes.starts_with(&MAGIC);
-            return Err(refused(if is_begun { "is cut short" } else { "is not of a shallow liquid" }));
-        };
-        let version = Reader::new(&header[8..]).u32()?;
-        if version != VERSION {
-            return Err(refused(&format!("has format {version}, and this library reads {VERSION}")));
-        }
-        let length = u64::from_le_bytes(Reader::new(&header[32..]).take()?);
-        if length > bytes.len() as u64 {
-            return Err(refused("is cut short"));
-        }
-        let (body, seal) = bytes.split_at(bytes.len() - SEAL);
-        if length < bytes.len() as u64 || xxh3_128(body).to_le_bytes() != *seal {
-            return Err(refused("is damaged"));
-        }
+        let (header, body) = open::<HEADER>(bytes, &BEGINNING)?;
         let header = Header::read(header)?;
         let counts = header.counts;
         if counts.size() != bytes.len() {

@@ -14,12 +14,12 @@ use super::header::{Counts, SCALAR, SHARE};
 use crate::error::Result;
 use crate::numeric::bytes::Reader;
 use crate::shallow::columns::STRIP;
+use crate::shallow::columns::runs::runs;
 use crate::shallow::free_fall::{Packet, Waiting};
 use crate::shallow::remap::Parcel;
 use crate::shallow::scalars::amounts::{ACCOUNTS, Amounts};
 use crate::shallow::scalars::shares::{LEVELS, MOST, nearest};
 use crate::shallow::scalars::{Law, Scalar};
-use crate::shallow::solver::active::runs;
 use crate::shallow::system::Shallow;
 
 /// Valid range of a sum of amounts: the total of all fits 128 bits.

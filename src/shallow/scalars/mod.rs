@@ -10,10 +10,11 @@ mod law;
 pub(super) mod shares;
 
 use super::columns::STRIP;
-use super::solver::active::runs;
+use super::columns::runs::fill_runs;
 use super::system::Shallow;
 use crate::error::{Error, Result};
 use crate::numeric::cpu::dispatch;
+use crate::numeric::lists::{check_each, check_room};
 use amounts::{ACCOUNTS, Account, Amounts};
 pub(super) use law::check_scalar;
 pub use law::{Law, Scalar};
@@ -98,12 +99,7 @@ impl Shallow {
 
     fn levels(&self, concentrations: &[f64]) -> Result<Levels> {
         let scalars = self.scalars();
-        if concentrations.len() != scalars.len() {
-            let (given, count) = (concentrations.len(), scalars.len());
-            return Err(Error::argument(format!(
-                "{given} concentrations are not one for each of {count} scalars"
-            )));
-        }
+        check_each(concentrations.len(), "concentrations", scalars.len(), "scalars")?;
         let mut levels = [0; MOST];
         for ((level, scalar), concentration) in levels.iter_mut().zip(scalars).zip(concentrations) {
             *level = scalar.level(*concentration)?;
@@ -125,27 +121,12 @@ impl Shallow {
     /// `Argument`: no such scalar, or `out` does not have one element for each index.
     pub fn concentrations(&self, scalar: usize, out: &mut [f32]) -> Result<()> {
         check_scalar(scalar, self.scalars().len())?;
-        let len = self.columns.len();
-        if out.len() != len {
-            let room = out.len();
-            return Err(Error::argument(format!(
-                "room for {room} concentrations is not that of {len} indices"
-            )));
-        }
-        let mut end = 0;
-        for run in runs(self.flow.active()) {
-            out[end * STRIP..run.start * STRIP].fill(0.0);
-            end = run.end;
-            let run = run.start * STRIP..run.end * STRIP;
-            find_concentrations(
-                &self.flow.amounts,
-                scalar,
-                &self.flow.depths()[run.clone()],
-                run.start,
-                &mut out[run],
-            );
-        }
-        out[end * STRIP..].fill(0.0);
+        check_room(out.len(), "concentrations", self.columns.len(), "indices")?;
+        fill_runs(self.flow.active(), out, |strips, out| {
+            let run = strips.start * STRIP..strips.end * STRIP;
+            let depth = &self.flow.depths()[run.clone()];
+            find_concentrations(&self.flow.amounts, scalar, depth, run.start, out);
+        });
         Ok(())
     }
 

@@ -6,6 +6,8 @@
 use std::ops::Range;
 
 use super::rest::Still;
+use crate::numeric::lists::reset;
+use crate::shallow::columns::runs::find;
 use crate::shallow::columns::{Columns, NONE, STRIP, resize_part, strip_of};
 use crate::shallow::pipes::Links;
 
@@ -134,12 +136,10 @@ impl Active {
             ends.map(|(&from, &to)| [from, to].map(|end| end / STRIP as u32))
                 .flat_map(|[a, b]| [[a, b], [b, a]])
         };
-        starts.clear();
-        starts.resize(strips + 2, 0);
+        reset(starts, strips + 2, 0);
         pairs().for_each(|[strip, _]| starts[strip as usize + 2] += 1);
         (2..strips + 2).for_each(|at| starts[at] += starts[at - 1]);
-        linked.clear();
-        linked.resize(2 * links.len(), 0);
+        reset(linked, 2 * links.len(), 0);
         for [strip, other] in pairs() {
             let end = &mut starts[strip as usize + 1];
             linked[*end as usize] = other;
@@ -454,14 +454,11 @@ impl Active {
                     && follows(last.north, own.north)
             };
             let spans = &mut self.spans[first..];
-            match count {
-                1.. if goes_on(&spans[count - 1]) => {
-                    spans[count - 1].len += own.len;
-                }
-                _ => {
-                    spans[count] = own;
-                    count += 1;
-                }
+            if count > 0 && goes_on(&spans[count - 1]) {
+                spans[count - 1].len += own.len;
+            } else {
+                spans[count] = own;
+                count += 1;
             }
         }
         self.counts[row] = count as u32;
@@ -471,23 +468,4 @@ impl Active {
 fn has_room(columns: &Columns, strip: usize) -> bool {
     let (base, ceiling) = (strip_of(columns.bases(), strip), strip_of(columns.ceilings(), strip));
     base.iter().zip(ceiling).any(|(base, ceiling)| base < ceiling)
-}
-
-/// Runs of marked strips.
-pub(in crate::shallow) fn runs(marks: &[bool]) -> impl Iterator<Item = std::ops::Range<usize>> + Clone + '_ {
-    let mut end = 0;
-    std::iter::from_fn(move || {
-        let first = find(marks, end, true);
-        end = find(marks, first, false);
-        (first < end).then_some(first..end)
-    })
-}
-
-/// The first strip, from `from` on, whose mark equals `wanted`; otherwise the count of all.
-fn find(marks: &[bool], from: usize, wanted: bool) -> usize {
-    let rest = &marks[from..];
-    // Skips many at once where none matches.
-    let has_none = |chunk: &&[bool]| chunk.iter().fold(true, |none, mark| none & (*mark != wanted));
-    let skipped = rest.chunks(64).take_while(has_none).map(<[bool]>::len).sum::<usize>();
-    from + skipped + rest[skipped..].iter().take_while(|mark| **mark != wanted).count()
 }

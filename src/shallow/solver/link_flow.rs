@@ -1,8 +1,9 @@
 //! The flow through links, and what lies beyond them.
 
+use std::iter::repeat_n;
 use std::ops::Range;
 
-use crate::shallow::columns::{Columns, resize_part};
+use crate::shallow::columns::Columns;
 use crate::shallow::pipes::Links;
 use crate::shallow::scalars::MOST as SCALARS;
 
@@ -45,17 +46,12 @@ impl LinkFlow {
         left: &[f32],
         scalars: usize,
     ) {
-        let new = part.start..part.start + flux.len();
-        for numbers in [&mut self.flux, &mut self.left, &mut self.transfer] {
-            resize_part(numbers, part.clone(), new.len(), 0.0);
-        }
+        self.flux.splice(part.clone(), flux.iter().copied());
+        self.left.splice(part.clone(), left.iter().copied());
+        self.transfer.splice(part.clone(), repeat_n(0.0, flux.len()));
         for fallen in self.fallen.iter_mut().take(scalars) {
-            resize_part(fallen, part.clone(), new.len(), 0.0);
-            fallen[new.clone()].fill(0.0);
+            fallen.splice(part.clone(), repeat_n(0.0, flux.len()));
         }
-        self.flux[new.clone()].copy_from_slice(flux);
-        self.left[new.clone()].copy_from_slice(left);
-        self.transfer[new].fill(0.0);
     }
 }
 

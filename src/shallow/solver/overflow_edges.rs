@@ -2,6 +2,7 @@
 //! the liquid there does not push back.
 
 use super::link_flow::LinkFlow;
+use crate::numeric::lists::reset;
 use crate::shallow::columns::{Columns, NONE};
 use crate::shallow::pipes::Links;
 use crate::shallow::pipes::cliffs::Cliffs;
@@ -59,8 +60,7 @@ impl OverflowEdges {
     ) {
         self.falls.clear();
         self.depth.clear();
-        self.flooded.clear();
-        self.flooded.resize(links.len(), 0);
+        reset(&mut self.flooded, links.len(), 0);
         for link in 0..links.len() {
             let fall = fall(columns, links, cliffs, link, depth);
             let from = if fall == Fall::Back { links.to[link] } else { links.from[link] };

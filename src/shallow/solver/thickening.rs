@@ -4,10 +4,10 @@
 //! concentrations of its columns and uses the resulting openness in all its steps.
 
 use super::Flow;
-use super::active::runs;
 use crate::error::Result;
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::per_column::{Array, PerColumn};
+use crate::shallow::columns::runs::runs;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_mut, strip_of};
 use crate::shallow::params::Thickening;
 use crate::shallow::pipes::{Links, Pipes};

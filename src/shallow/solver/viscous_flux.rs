@@ -76,6 +76,24 @@ impl<const VISCOUS: bool, const WHOLE: bool, const THINS: bool> Kind for Of<VISC
     const THINS: bool = THINS;
 }
 
+/// An expression for the variant of a step, which it names: it is compiled for each.
+macro_rules! by_kind {
+    ($step:expr, $kind:ident => $run:expr) => {
+        by_kind!($step, $kind => $run;
+            true true true, true true false, true false true, true false false, false true false, false false false)
+    };
+    ($step:expr, $kind:ident => $run:expr; $($viscous:literal $whole:literal $thins:literal),+) => {
+        match ($step.drag > 0.0, $step.is_whole, $step.drag > 0.0 && $step.thinning.is_some()) {
+            $(($viscous, $whole, $thins) => {
+                type $kind = $crate::shallow::solver::viscous_flux::Of<$viscous, $whole, $thins>;
+                $run
+            })+
+            (false, _, true) => unreachable!("only viscosity thins"),
+        }
+    };
+}
+pub(in crate::shallow) use by_kind;
+
 /// Maximum; a single instruction, as neither number is ever NaN.
 #[inline(always)]
 pub fn max(a: f32, b: f32) -> f32 {

@@ -121,33 +121,16 @@ impl FlowPoint {
     pub(super) fn find_columns(&self, columns: &Columns, found: &mut Vec<u32>) {
         let grid = &columns.grid;
         let [x, y, z] = self.at;
-        let reach = self.radius / grid.cell + 1.0;
-        let range = |axis: usize, at: f64| {
-            let centre = (at - grid.origin[axis]) / grid.cell;
-            let last = grid.size[axis] as f64 - 1.0;
-            let [low, high] = [centre - reach, centre + reach].map(|at| at.floor().clamp(0.0, last) as usize);
-            low..=high
-        };
-        let off = |i: usize| {
-            let [base, ceiling] =
-                [columns.bases()[i], columns.ceilings()[i]].map(|h| columns.heights.metres(h));
-            (base - y).max(y - ceiling).max(0.0)
-        };
         let near = self.radius.max(2.0 * grid.cell);
         let nearest = |cell: [usize; 2]| {
-            let column = columns.of_cell(cell).min_by(|&i, &j| off(i).total_cmp(&off(j)));
-            column.filter(|&i| off(i) <= near).map(|i| i as u32)
+            let (index, off) = columns.nearest(cell, y)?;
+            (off <= near).then_some(index as u32)
         };
         found.clear();
         let mut has_cells = false;
-        for row in range(1, z) {
-            for across in range(0, x) {
-                let [cx, cz] = grid.centre([across, row]);
-                if (cx - x).powi(2) + (cz - z).powi(2) <= self.radius * self.radius {
-                    has_cells = true;
-                    found.extend(nearest([across, row]));
-                }
-            }
+        for cell in grid.in_circle([x, z], self.radius) {
+            has_cells = true;
+            found.extend(nearest(cell));
         }
         if !has_cells {
             // Rounding to 32 bits may put a vertex on the border of a terrain slightly outside.

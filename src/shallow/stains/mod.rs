@@ -15,6 +15,7 @@ use super::scalars::amounts::Account;
 use super::system::Shallow;
 use crate::error::{Error, Result};
 use crate::geometry::Vec3;
+use crate::numeric::lists::check_room;
 use wet::Wet;
 
 /// Invisible stains are set to 0, before they are so small that processors give different results.
@@ -210,7 +211,7 @@ impl Stains {
     /// # Errors
     /// `Argument`: `out` does not have one element for each vertex.
     pub fn stains(&self, out: &mut [f32]) -> Result<()> {
-        self.check_room(out.len())?;
+        check_room(out.len(), "stains", self.len(), "vertices")?;
         out.iter_mut().zip(self.each()).for_each(|(out, stain)| *out = stain);
         Ok(())
     }
@@ -225,7 +226,7 @@ impl Stains {
     /// # Errors
     /// As [`Stains::stains`].
     pub fn soaked(&self, out: &mut [f32]) -> Result<()> {
-        self.check_room(out.len())?;
+        check_room(out.len(), "stains", self.len(), "vertices")?;
         out.iter_mut().zip(self.each_soaked()).for_each(|(out, soaked)| *out = soaked);
         Ok(())
     }
@@ -264,14 +265,6 @@ impl Stains {
             return Err(Error::argument(format!("there is no scalar {scalar} among {scalars} that stains")));
         }
         check_finite(positions)
-    }
-
-    fn check_room(&self, room: usize) -> Result<()> {
-        if room == self.len() {
-            return Ok(());
-        }
-        let count = self.len();
-        Err(Error::argument(format!("room for {room} stains is not that of {count} vertices")))
     }
 }
 

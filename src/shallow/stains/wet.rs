@@ -1,9 +1,10 @@
 //! Finds the wet columns at the vertices of a mesh.
 
 use crate::geometry::Vec3;
+use crate::numeric::lists::reset;
+use crate::shallow::columns::runs::runs;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_of};
 use crate::shallow::solver::Flow;
-use crate::shallow::solver::active::runs;
 
 /// A strip with columns that have a film.
 #[derive(Debug, Clone, Copy)]
@@ -28,8 +29,7 @@ impl Wet {
     pub fn find(&mut self, columns: &Columns, flow: &Flow, film: i32) {
         let blocks = columns.grid.size[0].div_ceil(STRIP);
         self.strips.clear();
-        self.first.clear();
-        self.first.resize(blocks * columns.grid.size[1], NONE);
+        reset(&mut self.first, blocks * columns.grid.size[1], NONE);
         for strip in runs(flow.active()).flatten() {
             let depths = strip_of(&flow.depth, strip);
             let bits = (0..STRIP).fold(0, |bits, x| bits | u16::from(depths[x] > film) << x);

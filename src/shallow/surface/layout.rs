@@ -140,34 +140,47 @@ impl Target<'_> {
 
     /// Checks that the mesh fits the buffers.
     pub(in crate::shallow) fn check(&self, counts: &Counts) -> Result<()> {
-        let fits = |name: &str, room: Option<usize>, needed: usize| match room {
-            Some(room) if room < needed => Err(Error::argument(format!(
-                "{name} has room for {room} numbers, and the surface has {needed}"
-            ))),
-            _ => Ok(()),
-        };
         let count = counts.vertices;
-        fits("positions", self.positions.as_ref().map(|out| out.len()), 3 * count)?;
-        fits("normals", self.normals.as_ref().map(|out| out.len()), 3 * count)?;
-        fits("depths", self.depths.as_ref().map(|out| out.len()), count)?;
-        fits("opacities", self.opacities.as_ref().map(|out| out.len()), count)?;
-        fits("velocities", self.velocities.as_ref().map(|out| out.len()), 3 * count)?;
-        for carried in &self.carried {
-            fits("carried", carried.as_ref().map(|out| out.len()), count)?;
-        }
-        fits("layers", self.layers.as_ref().map(|out| out.len()), count)?;
-        fits("columns", self.columns.as_ref().map(|out| out.len()), count)?;
-        let room = match &self.indices {
-            Indices::None => None,
-            Indices::U16(out) => Some(out.len()),
-            Indices::U32(out) => Some(out.len()),
-        };
-        fits("indices", room, counts.indices)?;
-        if matches!(self.indices, Indices::U16(_)) && count > 1 << 16 {
+        let numbers = [
+            ("positions", self.positions.as_deref(), 3 * count),
+            ("normals", self.normals.as_deref(), 3 * count),
+            ("depths", self.depths.as_deref(), count),
+            ("opacities", self.opacities.as_deref(), count),
+            ("velocities", self.velocities.as_deref(), 3 * count),
+        ];
+        let carried = self.carried.iter().map(|out| ("carried", out.as_deref(), count));
+        let numbers = numbers.into_iter().chain(carried);
+        let numbers = numbers.map(|(name, out, needed)| (name, out.map(<[f32]>::len), needed));
+        let ids = [("layers", self.layers.as_deref()), ("columns", self.columns.as_deref())];
+        let ids = ids.map(|(name, out)| (name, out.map(<[u32]>::len), count));
+        check_buffers("surface has", counts, numbers.chain(ids), &self.indices)
+    }
+}
+
+/// Checks that a mesh fits its buffers, each given by its name, its length if there is one, and how much is needed.
+pub(in crate::shallow) fn check_buffers<'a>(
+    mesh_has: &str,
+    counts: &Counts,
+    buffers: impl Iterator<Item = (&'a str, Option<usize>, usize)>,
+    indices: &Indices<'_>,
+) -> Result<()> {
+    let room = match indices {
+        Indices::None => None,
+        Indices::U16(out) => Some(out.len()),
+        Indices::U32(out) => Some(out.len()),
+    };
+    for (name, room, needed) in buffers.chain([("indices", room, counts.indices)]) {
+        if let Some(room) = room.filter(|room| *room < needed) {
             return Err(Error::argument(format!(
-                "{count} vertices are too many for indices of 16 bits: take those of 32"
+                "{name} has room for {room} numbers, and the {mesh_has} {needed}"
             )));
         }
-        Ok(())
     }
+    let count = counts.vertices;
+    if matches!(indices, Indices::U16(_)) && count > 1 << 16 {
+        return Err(Error::argument(format!(
+            "{count} vertices are too many for indices of 16 bits: take those of 32"
+        )));
+    }
+    Ok(())
 }

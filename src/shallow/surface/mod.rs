@@ -33,6 +33,7 @@ mod self_check;
 
 use super::columns::{Columns, NONE, STRIP};
 use crate::error::{Error, Result};
+use crate::numeric::lists::check_each;
 pub use buffers::capacity::bound;
 use buffers::normals::Normals;
 use buffers::vertices::Vertices;
@@ -64,7 +65,7 @@ pub struct Surface {
 impl Surface {
     /// Reserves memory for any liquid that these columns can hold: from then on [`Surface::build`] allocates nothing for them.
     pub fn reserve(&mut self, columns: &Columns) {
-        let layers = columns.strips().iter().map(|strip| strip.layer as usize + 1).max().unwrap_or(0);
+        let layers = columns.layers();
         quartets::links::find_above(columns, &mut self.above);
         self.found.reset(columns);
         self.normals.reset(columns);
@@ -81,35 +82,18 @@ impl Surface {
     /// As [`Surface::build`], for the depths.
     pub fn count(&mut self, columns: &Columns, depths: &Depths<'_>) -> Result<Counts> {
         let len = columns.len();
-        if depths.depth.len() != len {
-            return Err(Error::argument(format!(
-                "{} depths are not one for each of {len} indices",
-                depths.depth.len()
-            )));
+        check_each(depths.depth.len(), "depths", len, "indices")?;
+        let lists = [
+            (depths.velocity.len(), "velocities"),
+            (depths.least.len(), "least depths"),
+            (depths.sunk.len(), "sunk depths"),
+        ];
+        let carried = depths.carried.iter().map(|carried| (carried.len(), "concentrations"));
+        for (count, what) in lists.into_iter().chain(carried).filter(|(count, _)| *count > 0) {
+            check_each(count, what, len, "indices")?;
         }
-        if !depths.velocity.is_empty() && depths.velocity.len() != len {
-            let count = depths.velocity.len();
-            return Err(Error::argument(format!("{count} velocities are not one for each of {len} indices")));
-        }
-        for (name, lengths) in [("least depths", depths.least), ("sunk depths", depths.sunk)] {
-            if !lengths.is_empty() && lengths.len() != len {
-                let count = lengths.len();
-                return Err(Error::argument(format!("{count} {name} are not one for each of {len} indices")));
-            }
-        }
-        if let Some(carried) =
-            depths.carried.iter().find(|carried| !carried.is_empty() && carried.len() != len)
-        {
-            let count = carried.len();
-            return Err(Error::argument(format!(
-                "{count} concentrations are not one for each of {len} indices"
-            )));
-        }
-        if let Some(active) = depths.active.filter(|active| active.len() != len / STRIP) {
-            let (count, strips) = (active.len(), len / STRIP);
-            return Err(Error::argument(format!(
-                "{count} flags of activity are not one for each of {strips} strips"
-            )));
+        if let Some(active) = depths.active {
+            check_each(active.len(), "flags of activity", len / STRIP, "strips")?;
         }
         if depths.ledges.is_some_and(|ledges| ledges.columns != len) {
             return Err(Error::argument("the ledges are those of other columns"));

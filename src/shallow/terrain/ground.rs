@@ -69,8 +69,7 @@ impl Ground {
                 old.into_iter().chain(new).for_each(|shape| see(shape.cells(grid)));
             }
         }
-        self.bodies.clear();
-        self.bodies.extend_from_slice(bodies);
+        bodies.clone_into(&mut self.bodies);
     }
 
     /// Clears the terrain's solids; [`Ground::add`] is then called for every cell, row by row along x.

@@ -1,6 +1,7 @@
 //! Crossings of lines, cell by cell, and the solids between them.
 
 use super::solids::Solid;
+use crate::numeric::lists::reset;
 use crate::shallow::columns::grid::BOTTOMLESS;
 
 /// The crossings of the lines of a box of cells: height (units) x 2, plus 1 if the triangle faces up.
@@ -18,8 +19,7 @@ impl Piles {
     /// Clears the crossings, for this many cells.
     pub fn reset(&mut self, cells: usize) {
         self.crossings.clear();
-        self.ends.clear();
-        self.ends.resize(cells, 0);
+        reset(&mut self.ends, cells, 0);
     }
 
     /// Count of crossings.

@@ -4,6 +4,7 @@ use super::Solids;
 use super::solids::{Solid, unite};
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
+use crate::numeric::lists::refill;
 use crate::shallow::columns::grid::{BOTTOMLESS, Grid, Heights, TOP};
 
 /// Positions per batch.
@@ -41,8 +42,7 @@ pub fn solids(
     let mut next = 0;
     while next < count {
         let end = count.min(next + BATCH);
-        positions.clear();
-        positions.extend((next..end).map(|index| ladder.position(&grid, index)));
+        refill(&mut positions, (next..end).map(|index| ladder.position(&grid, index)));
         sample(&positions, &mut distances)?;
         if distances.len() != positions.len() {
             let (got, wanted) = (distances.len(), positions.len());
@@ -167,8 +167,7 @@ mod tests {
         let mut largest = 0;
         let found = solids(GRID, heights(), voxel, [-1.0, 1.0], |positions, out| {
             largest = largest.max(positions.len());
-            out.clear();
-            out.extend(positions.iter().map(|position| distance(*position) as f32));
+            refill(out, positions.iter().map(|position| distance(*position) as f32));
             Ok(())
         });
         assert!(largest <= 1 << 14, "{largest}");
@@ -224,8 +223,7 @@ mod tests {
             count.set(0);
             let found = solids(GRID, heights, 0.1, between, |positions, out| {
                 count.set(count.get() + positions.len());
-                out.clear();
-                out.extend(positions.iter().map(|position| ball(*position)));
+                refill(out, positions.iter().map(|position| ball(*position)));
                 Ok(())
             });
             found.unwrap()

@@ -34,6 +34,17 @@ impl Solids {
         Self { grid, heights, starts: vec![0], solids: Vec::new() }
     }
 
+    /// Intervals of each cell (`Grid::index`), which are sorted and separate.
+    pub(in crate::shallow) fn of_cells<'a>(
+        grid: Grid,
+        heights: Heights,
+        cell: impl Fn(usize) -> &'a [Solid],
+    ) -> Self {
+        let mut out = Self::empty(grid, heights);
+        (0..grid.cells()).for_each(|index| out.push(cell(index)));
+        out
+    }
+
     /// Adds the next cell, whose intervals are sorted and separate.
     pub fn push(&mut self, cell: &[Solid]) {
         debug_assert!(cell.windows(2).all(|pair| pair[0][1] < pair[1][0]));

@@ -21,7 +21,8 @@ use super::solids::Solid;
 use crate::error::{Error, Result};
 use crate::geometry::Vec3;
 use crate::numeric::cpu::{FlushDenormals, dispatch};
-use crate::shallow::columns::grid::{Grid, Heights};
+use crate::numeric::lists::refill;
+use crate::shallow::columns::grid::{Grid, Heights, check_cells};
 
 /// Up to this many lines are tested against a triangle without looking at its edges.
 const FEW: u32 = 3;
@@ -36,11 +37,7 @@ pub fn solids(positions: &[Vec3], triangles: &[[u32; 3]], grid: Grid, heights: H
     let mut caster = Caster::new(grid, heights)?;
     let [nx, nz] = grid.size;
     caster.cast(positions, triangles, [0..nx, 0..nz])?;
-    let mut out = Solids::empty(grid, heights);
-    for cell in 0..grid.cells() {
-        out.push(caster.at(cell));
-    }
-    Ok(out)
+    Ok(Solids::of_cells(grid, heights, |cell| caster.at(cell)))
 }
 
 /// Casts the lines through a box of cells again and again. Buffers keep capacity for half as many crossings again: it allocates only for a
@@ -133,14 +130,8 @@ impl Caster {
         self.cells = [0..0, 0..0];
         self.starts.clear();
         self.solids.clear();
-        let [x, z] = cells;
-        let [nx, nz] = self.size;
-        if x.start > x.end || z.start > z.end || x.end > nx || z.end > nz {
-            return Err(Error::argument(format!(
-                "cells {x:?} x {z:?} are not a box within {nx} x {nz} cells"
-            )));
-        }
-        self.piles.reset(x.len() * z.len());
+        check_cells(cells, self.size)?;
+        self.piles.reset(cells[0].len() * cells[1].len());
         Ok(())
     }
 
@@ -149,12 +140,14 @@ impl Caster {
         let [along_x, along_z] = &self.lines;
         let [x, z] = [x, z].map(|range| [range.start as u32, range.end as u32]);
         let mut is_finite = true;
-        self.ranks.clear();
-        self.ranks.extend(positions.iter().map(|p| {
-            is_finite &= p.x.is_finite() & p.y.is_finite() & p.z.is_finite();
-            let ranks = [along_x.rank(p.x.into()), along_z.rank(p.z.into())];
-            [ranks[0].clamp(x[0], x[1]), ranks[1].clamp(z[0], z[1])]
-        }));
+        refill(
+            &mut self.ranks,
+            positions.iter().map(|p| {
+                is_finite &= p.x.is_finite() & p.y.is_finite() & p.z.is_finite();
+                let ranks = [along_x.rank(p.x.into()), along_z.rank(p.z.into())];
+                [ranks[0].clamp(x[0], x[1]), ranks[1].clamp(z[0], z[1])]
+            }),
+        );
         if is_finite {
             return Ok(());
         }

@@ -17,37 +17,29 @@ impl Ground {
         let Grid { cell, origin, size: [nx, nz] } = solids.grid;
         let grid = Grid { cell: 2.0 * cell, origin, size: [nx / 2, nz / 2] };
         let cells = (0..grid.cells()).map(|index| {
-            let [x, z] = grid.position(index);
-            let four = [[0, 0], [1, 0], [0, 1], [1, 1]];
-            mean(four.map(|[dx, dz]| solids.cell(solids.grid.index([2 * x + dx, 2 * z + dz]))))
+            mean(quarters(grid.position(index)).map(|cell| solids.cell(solids.grid.index(cell))))
         });
         Self { fine: solids.clone(), coarse: Solids::new(grid, solids.heights, cells) }
     }
 
-    /// The fine ground of the near cells.
-    pub fn fine_solids(&self, near: &Cells) -> Solids {
-        let grid = self.fine.grid;
-        let cell = |index: usize| self.fine_cell(near, grid.position(index));
-        let mut out = Solids::empty(grid, self.fine.heights);
-        (0..grid.cells()).for_each(|index| out.push(cell(index)));
-        out
-    }
-
-    /// The coarse ground of all others.
-    pub fn coarse_solids(&self, near: &Cells) -> Solids {
-        let grid = self.coarse.grid;
-        let cell = |index: usize| self.coarse_cell(near, grid.position(index));
-        let mut out = Solids::empty(grid, self.coarse.heights);
-        (0..grid.cells()).for_each(|index| out.push(cell(index)));
-        out
+    /// The fine ground of the near cells, and the coarse ground of all others.
+    pub fn apart_solids(&self, near: &Cells) -> [Solids; 2] {
+        let Self { fine, coarse } = self;
+        [
+            Solids::of_cells(fine.grid, fine.heights, |index| {
+                self.fine_cell(near, fine.grid.position(index))
+            }),
+            Solids::of_cells(coarse.grid, coarse.heights, |index| {
+                self.coarse_cell(near, coarse.grid.position(index))
+            }),
+        ]
     }
 
     /// The fine cells that belong to the coarse liquid, and the coarse cells that belong to the fine liquid.
     pub fn apart(near: &Cells) -> [ExcludedCells; 2] {
-        let halved = near.clone().map(|range| range.start / 2..range.end / 2);
         [
             ExcludedCells { cells: near.clone(), is_inside: false },
-            ExcludedCells { cells: halved, is_inside: true },
+            ExcludedCells { cells: halved(near), is_inside: true },
         ]
     }
 
@@ -62,6 +54,16 @@ impl Ground {
         let is_near = near[0].contains(&(2 * x)) && near[1].contains(&(2 * z));
         if is_near { &[] } else { self.coarse.cell(self.coarse.grid.index([x, z])) }
     }
+}
+
+/// The coarse cells of fine ones.
+pub(super) fn halved(cells: &Cells) -> Cells {
+    cells.clone().map(|range| range.start / 2..range.end / 2)
+}
+
+/// The fine cells of a coarse one.
+pub(super) fn quarters([x, z]: [usize; 2]) -> [[usize; 2]; 4] {
+    [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[dx, dz]| [2 * x + dx, 2 * z + dz])
 }
 
 /// The mean of four cells' solids, layer by layer from the lowest, over the cells that have the layer.

@@ -81,8 +81,9 @@ impl Detail {
         }
         let ground = Ground::new(solids);
         let [beyond, within] = Ground::apart(&near).map(Some);
-        let fine = Shallow::beside(ctx, &ground.fine_solids(&near), params.clone(), beyond)?;
-        let coarse = Shallow::beside(ctx, &ground.coarse_solids(&near), params, within)?;
+        let [fine, coarse] = ground.apart_solids(&near);
+        let fine = Shallow::beside(ctx, &fine, params.clone(), beyond)?;
+        let coarse = Shallow::beside(ctx, &coarse, params, within)?;
         let mut detail = Self {
             rest: Rests::new(coarse.columns.grid.cells()),
             fine,

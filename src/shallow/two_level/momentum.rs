@@ -4,12 +4,14 @@
 
 use super::Detail;
 use super::buffers::Momentum;
+use crate::numeric::lists::refill;
 use crate::shallow::Shallow;
-use crate::shallow::columns::STRIP;
 use crate::shallow::columns::grid::Cells;
+use crate::shallow::pipes::cliffs::beside;
+use crate::shallow::pipes::side::Side;
 
-/// The pipe of a side.
-enum Side {
+/// The pipe through a side of a fine cell.
+enum Pipe {
     /// In the fine liquid: its column.
     Fine(usize),
     /// In the coarse liquid, between two of its cells.
@@ -29,22 +31,21 @@ impl Momentum {
         let wider = |cells: Cells| {
             [0, 1].map(|axis| cells[axis].start.saturating_sub(2)..(cells[axis].end + 2).min(size[axis]))
         };
-        self.boxes.clear();
-        self.boxes.extend(boxes.filter(|cells| cells.iter().all(|range| !range.is_empty())).map(wider));
+        refill(&mut self.boxes, boxes.filter(|cells| cells.iter().all(|range| !range.is_empty())).map(wider));
         self.layers = detail.ground.fine.layers().max(detail.ground.coarse.layers());
         let Self { boxes, layers, fluxes } = self;
         fluxes.clear();
         for cells in boxes {
             each(cells, *layers, |cell, layer, axis| {
                 let flux = match side(detail, near, cell, layer, axis) {
-                    Side::Fine(column) => detail.fine.flow.flux[axis][column],
-                    Side::Coarse(column) => 2.0 * detail.coarse.flow.flux[axis][column],
-                    Side::Within(column, before) => {
+                    Pipe::Fine(column) => detail.fine.flow.flux[axis][column],
+                    Pipe::Coarse(column) => 2.0 * detail.coarse.flow.flux[axis][column],
+                    Pipe::Within(column, before) => {
                         let flux = &detail.coarse.flow.flux[axis];
                         flux[column] + before.map_or(0.0, |before| flux[before])
                     }
-                    Side::Seam(column, axis, way) => way as f32 * detail.seam.flux(column, axis, way),
-                    Side::Closed => 0.0,
+                    Pipe::Seam(column, axis, way) => way as f32 * detail.seam.flux(column, axis, way),
+                    Pipe::Closed => 0.0,
                 };
                 fluxes.push(flux);
             });
@@ -61,15 +62,15 @@ impl Momentum {
             each(cells, self.layers, |cell, layer, axis| {
                 let flux = self.fluxes[at];
                 match side(detail, &near, cell, layer, axis) {
-                    Side::Fine(column) => set(&mut detail.fine, axis, column, flux),
-                    Side::Coarse(column) if cell[1 - axis].is_multiple_of(2) => {
+                    Pipe::Fine(column) => set(&mut detail.fine, axis, column, flux),
+                    Pipe::Coarse(column) if cell[1 - axis].is_multiple_of(2) => {
                         let row = if axis == 0 { cells[0].len() } else { 1 };
                         set(&mut detail.coarse, axis, column, 0.25 * (flux + self.fluxes[at + row * width]));
                     }
-                    Side::Seam(column, axis, way) => {
+                    Pipe::Seam(column, axis, way) => {
                         detail.seam.set_flux(column, axis, way, way as f32 * flux);
                     }
-                    Side::Coarse(_) | Side::Within(..) | Side::Closed => {}
+                    Pipe::Coarse(_) | Pipe::Within(..) | Pipe::Closed => {}
                 }
                 at += 1;
             });
@@ -86,31 +87,22 @@ fn set(liquid: &mut Shallow, axis: usize, column: usize, flux: f32) {
 }
 
 /// The pipe that leads from a fine cell to the next along an axis.
-fn side(detail: &Detail, near: &Cells, cell: [usize; 2], layer: usize, axis: usize) -> Side {
+fn side(detail: &Detail, near: &Cells, cell: [usize; 2], layer: usize, axis: usize) -> Pipe {
     let mut next = cell;
     next[axis] += 1;
     let is_near = |cell: [usize; 2]| near[0].contains(&cell[0]) && near[1].contains(&cell[1]);
     let coarse = |cell: [usize; 2]| detail.coarse.columns.column(cell.map(|at| at / 2), layer);
     let found = match [is_near(cell), is_near(next)] {
-        [true, true] => detail.fine.columns.column(cell, layer).map(Side::Fine),
-        [true, false] => detail.fine.columns.column(cell, layer).map(|column| Side::Seam(column, axis, 1)),
-        [false, true] => detail.fine.columns.column(next, layer).map(|column| Side::Seam(column, axis, -1)),
-        [false, false] if cell[axis] % 2 == 1 => coarse(cell).map(Side::Coarse),
+        [true, true] => detail.fine.columns.column(cell, layer).map(Pipe::Fine),
+        [true, false] => detail.fine.columns.column(cell, layer).map(|column| Pipe::Seam(column, axis, 1)),
+        [false, true] => detail.fine.columns.column(next, layer).map(|column| Pipe::Seam(column, axis, -1)),
+        [false, false] if cell[axis] % 2 == 1 => coarse(cell).map(Pipe::Coarse),
         [false, false] => {
-            coarse(cell).map(|column| Side::Within(column, before(&detail.coarse, column, axis)))
+            let before = |column| beside(&detail.coarse.columns, column, [Side::West, Side::North][axis]);
+            coarse(cell).map(|column| Pipe::Within(column, before(column)))
         }
     };
-    found.unwrap_or(Side::Closed)
-}
-
-/// The column whose regular pipe along an axis leads to a given column.
-fn before(liquid: &Shallow, column: usize, axis: usize) -> Option<usize> {
-    let (strip, position) = (column / STRIP, column % STRIP);
-    if axis == 0 {
-        return (position > 0 || liquid.columns.west(strip).is_some()).then(|| column - 1);
-    }
-    let north = liquid.columns.north(strip) as usize;
-    (north < liquid.columns.strips().len()).then(|| north * STRIP + position)
+    found.unwrap_or(Pipe::Closed)
 }
 
 /// Calls `see` with each fine cell of a box, layer and axis.

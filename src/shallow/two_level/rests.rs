@@ -1,6 +1,7 @@
 //! What does not make up a whole coarse unit in a coarse cell: it waits there, with what it carries.
 
 use super::FINE;
+use crate::numeric::lists::reset;
 use crate::shallow::Shallow;
 use crate::shallow::scalars::MOST;
 use crate::shallow::scalars::amounts::Account;
@@ -54,8 +55,7 @@ impl Rests {
 
     /// From now on the liquid carries this many scalars, all 0 so far.
     pub fn carry(&mut self, scalars: usize) {
-        self.amounts.clear();
-        self.amounts.resize(if scalars > 0 { self.units.len() } else { 0 }, [0; MOST]);
+        reset(&mut self.amounts, if scalars > 0 { self.units.len() } else { 0 }, [0; MOST]);
     }
 
     /// Removes everything that waits.

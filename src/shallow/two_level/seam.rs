@@ -8,12 +8,13 @@
 use super::FINE;
 use super::rests::{Load, Rests, change, of_column};
 use crate::numeric::cpu::dispatch;
+use crate::numeric::lists::{refill, reset};
 use crate::shallow::columns::grid::{Cells, TOP};
 use crate::shallow::columns::{Columns, NONE};
 use crate::shallow::scalars::MOST;
 use crate::shallow::scalars::shares::level;
 use crate::shallow::solver::fast_films;
-use crate::shallow::solver::viscous_flux::{Kind, Of, Step, flux_of, split};
+use crate::shallow::solver::viscous_flux::{Kind, Step, by_kind, flux_of, split};
 use crate::shallow::time_step::Measures;
 use crate::shallow::{Shallow, time_step};
 
@@ -91,13 +92,11 @@ impl Seam {
         }
         for end in 0..2 {
             let columns = &mut self.columns[end];
-            columns.clear();
-            columns.extend(self.pipes.iter().map(|pipe| pipe.ends[end]));
+            refill(columns, self.pipes.iter().map(|pipe| pipe.ends[end]));
             columns.sort_unstable();
             columns.dedup();
             for sums in [&mut self.gives[end], &mut self.takes[end]] {
-                sums.clear();
-                sums.resize(columns.len(), 0.0);
+                reset(sums, columns.len(), 0.0);
             }
             self.factors[end].resize(columns.len(), 1.0);
         }
@@ -106,8 +105,7 @@ impl Seam {
             columns.iter().all(|&column| liquid.columns.ceilings()[column as usize] == TOP)
         };
         self.has_ceilings = ![fine, coarse].into_iter().zip(&self.columns).all(is_open);
-        self.cells.clear();
-        self.cells.extend(self.columns[1].iter().map(cell));
+        refill(&mut self.cells, self.columns[1].iter().map(cell));
         let position =
             |end: usize, column: u32| self.columns[end].partition_point(|&other| other < column) as u32;
         self.positions.clear();
@@ -200,23 +198,9 @@ impl Seam {
         let step = time_step::step(&fine.params, measures, length, self.last);
         let step = Step { drive: step.drive / APART, ..step };
         self.last = length;
-        /// One copy for each kind of flow and instruction set.
-        macro_rules! run {
-            ($($viscous:literal $whole:literal $thins:literal)*) => {
-                match (step.drag > 0.0, step.is_whole, step.drag > 0.0 && step.thinning.is_some()) {
-                    $(($viscous, $whole, $thins) => {
-                        #[inline(always)]
-                        fn body(seam: &mut Seam, step: &Step, fine: &Shallow, coarse: &Shallow) -> bool {
-                            seam.drive::<Of<$viscous, $whole, $thins>>(step, fine, coarse)
-                        }
-                        let (seam, step) = (&mut *self, &step);
-                        dispatch!(body(seam: &mut Seam, step: &Step, fine: &Shallow, coarse: &Shallow) -> bool)
-                    })*
-                    (false, _, true) => unreachable!("only viscosity thins"),
-                }
-            };
-        }
-        self.is_moving = run!(true true true true true false true false true true false false false true false false false false);
+        let (seam, step) = (&mut *self, &step);
+        self.is_moving = by_kind!(step, K =>
+            dispatch!(Seam::drive::<K>(seam: &mut Seam, step: &Step, fine: &Shallow, coarse: &Shallow) -> bool));
     }
 
     /// Makes the transfers across the edge, limited to the liquid and the room that the step has left in the columns.
@@ -250,16 +234,10 @@ impl Seam {
             let beside = |end: u32| {
                 let end = end as usize;
                 (end != NONE as usize && coarse_depths[end] > 0)
-                    .then(|| coarse_bases[end] + coarse_depths[end])
+                    .then(|| i64::from(coarse_bases[end] + coarse_depths[end]))
             };
             // Eight times the rise over a quarter of a cell to the side.
-            let rise = match pipe.along.map(beside) {
-                _ if depth[1] == 0 => 0,
-                [Some(before), Some(behind)] => behind - before,
-                [Some(before), None] => 2 * (eta - before),
-                [None, Some(behind)] => 2 * (behind - eta),
-                [None, None] => 0,
-            };
+            let rise = if depth[1] == 0 { 0 } else { rise(i64::from(eta), pipe.along.map(beside)) as i32 };
             // The tilt of gravity is per cell.
             let tilt = (APART * step.tilt[pipe.axis] as f32) as i32 * pipe.way;
             let fall = bases[i] + depth[0] - eta - (pipe.side * rise) / 8 + tilt;
@@ -347,8 +325,7 @@ impl Seam {
         let Self { pipes, positions, columns, amounts, .. } = self;
         let count = fine.flow.amounts.count();
         for (amounts, columns) in amounts.iter_mut().zip(columns) {
-            amounts.clear();
-            amounts.resize(if count > 0 { columns.len() } else { 0 }, [0; MOST]);
+            reset(amounts, if count > 0 { columns.len() } else { 0 }, [0; MOST]);
         }
         if count == 0 {
             return;
@@ -377,6 +354,16 @@ fn add(gives: &mut [Vec<f64>; 2], takes: &mut [Vec<f64>; 2], positions: &[u32; 2
     } else {
         gives[1][coarse] += units;
         takes[0][fine] += units;
+    }
+}
+
+/// The rise of a surface between the columns before and behind another one, or twice that on the side of the only one that is wet.
+pub(super) fn rise(own: i64, sides: [Option<i64>; 2]) -> i64 {
+    match sides {
+        [Some(before), Some(behind)] => behind - before,
+        [Some(before), None] => 2 * (own - before),
+        [None, Some(behind)] => 2 * (behind - own),
+        [None, None] => 0,
     }
 }
 

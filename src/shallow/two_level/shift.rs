@@ -6,7 +6,9 @@
 
 use super::Detail;
 use super::buffers::Moving;
+use super::ground::{halved, quarters};
 use super::rests::{Load, change, of_column};
+use super::seam::rise;
 use crate::error::Result;
 use crate::shallow::Shallow;
 use crate::shallow::columns::grid::Cells;
@@ -16,8 +18,8 @@ impl Detail {
     /// Hands the cells that were near, or are now, to the other liquid.
     pub(super) fn convert(&mut self, old: &Cells) -> Result<()> {
         let mut shift = std::mem::take(&mut self.shift);
-        let (near, [old_coarse, new_coarse]) =
-            (self.near.clone(), [old, &self.near].map(|cells| [0, 1].map(|axis| halved(&cells[axis]))));
+        let near = self.near.clone();
+        let [old_coarse, new_coarse] = [old, &near].map(halved);
         shift.leaving.clear();
         shift.entering.clear();
         for cells in beyond(&old_coarse, &new_coarse) {
@@ -188,15 +190,9 @@ fn lean(liquid: &Shallow, [x, z]: [usize; 2], layer: usize, eta: i64) -> [i64; 2
         let column = liquid.columns.column([x?, z?], layer)?;
         (liquid.flow.depths()[column] > 0).then(|| surface(liquid, column))
     };
-    let rise = |before: Option<i64>, behind: Option<i64>| match [before, behind] {
-        [Some(before), Some(behind)] => behind - before,
-        [Some(before), None] => 2 * (eta - before),
-        [None, Some(behind)] => 2 * (behind - eta),
-        [None, None] => 0,
-    };
     [
-        rise(beside(x.checked_sub(1), Some(z)), beside(Some(x + 1), Some(z))),
-        rise(beside(Some(x), z.checked_sub(1)), beside(Some(x), Some(z + 1))),
+        rise(eta, [beside(x.checked_sub(1), Some(z)), beside(Some(x + 1), Some(z))]),
+        rise(eta, [beside(Some(x), z.checked_sub(1)), beside(Some(x), Some(z + 1))]),
     ]
 }
 
@@ -234,18 +230,9 @@ fn lay<'a>(
     Ok(())
 }
 
-/// The fine cells of a coarse one.
-fn quarters([x, z]: [usize; 2]) -> [[usize; 2]; 4] {
-    [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[dx, dz]| [2 * x + dx, 2 * z + dz])
-}
-
 /// The boxes of fine cells that are near in only one of two boxes; some may be empty.
 pub(super) fn changed(old: &Cells, new: &Cells) -> impl Iterator<Item = Cells> {
     beyond(old, new).into_iter().chain(beyond(new, old))
-}
-
-fn halved(range: &std::ops::Range<usize>) -> std::ops::Range<usize> {
-    range.start / 2..range.end / 2
 }
 
 fn each(cells: &Cells) -> impl Iterator<Item = [usize; 2]> {

@@ -12,6 +12,7 @@ use crate::distance::nearest::{Search, search};
 use crate::distance::triangle::Triangle;
 use crate::error::Result;
 use crate::geometry::Coord;
+use crate::geometry::coords::{around, between, is_between};
 use crate::numeric::blocks::{DIM, VOXELS, Values, offset};
 use crate::numeric::lanes::LANES;
 
@@ -66,7 +67,7 @@ impl Distances {
     ) -> Result<Self> {
         let runs: Vec<(Coord, &[[u32; 3]])> = surface.runs().collect();
         // The blocks that may have nodes near triangles of a run.
-        let around = |patch: &Coord, reach: f32| {
+        let reached = |patch: &Coord, reach: f32| {
             let margin = reach.ceil() as i32;
             let low = patch.map(|at| (at * SIDE - margin).div_euclid(DIM as i32));
             let high = patch.map(|at| (at * SIDE + SIDE + margin).div_euclid(DIM as i32));
@@ -74,17 +75,13 @@ impl Distances {
         };
         let deepest = deep.iter().map(|(_, reach)| *reach).fold(reach, f32::max);
         let blocks = |((patch, _), run): (&(Coord, &[[u32; 3]]), u32)| {
-            let ([low, high], [from, to]) = (around(patch, reach), around(patch, deepest));
-            let on = move |axis: usize| from[axis]..=to[axis];
-            let all = on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z])));
-            let is_in = |block: &Coord, [low, high]: [Coord; 2]| {
-                (0..3).all(|axis| (low[axis]..=high[axis]).contains(&block[axis]))
-            };
+            let ([low, high], [from, to]) = (reached(patch, reach), reached(patch, deepest));
             let is_wanted = |block: &Coord| {
-                is_in(block, [low, high])
-                    || reach_in(&deep, *block).is_some_and(|reach| is_in(block, around(patch, reach)))
+                let is_in = |[low, high]: [Coord; 2]| is_between(*block, low, high);
+                is_in([low, high])
+                    || reach_in(&deep, *block).is_some_and(|reach| is_in(reached(patch, reach)))
             };
-            all.filter(is_wanted).map(|block| (block, run)).collect::<Vec<(Coord, u32)>>()
+            between(from, to).filter(is_wanted).map(|block| (block, run)).collect::<Vec<(Coord, u32)>>()
         };
         let pairs: Vec<Vec<(Coord, u32)>> =
             runs.par_iter().zip(0..runs.len() as u32).with_min_len(64).map(blocks).collect();
@@ -124,17 +121,8 @@ impl Distances {
         let (coords, values): (Vec<Coord>, Vec<Values>) =
             groups.iter().zip(values).filter_map(|(group, values)| Some((group[0].0, *values?))).unzip();
         let slots: HashMap<Coord, u32> = coords.iter().copied().zip(0..).collect();
-        let find = |[x, y, z]: [i32; 3]| slots.get(&[x, y, z]).copied().unwrap_or(Self::NONE);
-        let around = coords
-            .par_iter()
-            .with_min_len(64)
-            .map(|[x, y, z]| {
-                std::array::from_fn(|n| {
-                    let n = n as i32;
-                    find([x + n / 9 - 1, y + n / 3 % 3 - 1, z + n % 3 - 1])
-                })
-            })
-            .collect();
+        let find = |block: Coord| slots.get(&block).copied().unwrap_or(Self::NONE);
+        let around = coords.par_iter().with_min_len(64).map(|block| around(*block).map(find)).collect();
         Ok(Self { cell: phi.cell(), reach, deep, coords, values, slots, around })
     }
 

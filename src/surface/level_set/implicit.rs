@@ -11,8 +11,8 @@ use super::SUPPORT;
 use super::kernel::{Near, values};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::geometry::Coord;
-use crate::geometry::DVec3;
+use crate::geometry::coords::between;
+use crate::geometry::{Coord, DVec3};
 use crate::numeric::lanes::LANES;
 use crate::surface::particles::grid::Cells;
 
@@ -186,8 +186,7 @@ impl Around<'_> {
                 let low = cell.map(|at| ((f64::from(at) * edge - self.spacing) / self.edge()).floor() as i32);
                 let high =
                     cell.map(|at| ((f64::from(at + 1) * edge + self.spacing) / self.edge()).floor() as i32);
-                let on = move |axis: usize| low[axis]..=high[axis];
-                on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z])))
+                between(low, high)
             })
             .collect();
         near.par_sort_unstable();

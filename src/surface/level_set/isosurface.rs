@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 
 use super::implicit::{Implicit, NODES, SIDE};
-use crate::geometry::Coord;
+use crate::geometry::coords::{cells_at, nodes_of};
 use crate::geometry::marching_cubes::cases;
-use crate::geometry::{DVec3, TriMesh};
+use crate::geometry::{Coord, DVec3, TriMesh};
 
 /// Sentinel: no vertex.
 const NONE: u8 = u8::MAX;
@@ -48,7 +48,8 @@ impl Isosurface {
             owners.resize(positions.len(), owner);
             first.push(positions.len() as u32);
         }
-        let mut patches = with_lower(phi.patches());
+        // Patches and those before them on each axis.
+        let mut patches: Vec<Coord> = phi.patches().iter().flat_map(|patch| cells_at(*patch)).collect();
         patches.par_sort_unstable();
         patches.dedup();
         let run = |patch: &Coord| triangles(phi, *patch, &crossings, &first);
@@ -106,12 +107,6 @@ impl Isosurface {
         }
         TriMesh { positions, triangles: self.triangles.clone() }
     }
-}
-
-/// Patches and those before them on each axis.
-fn with_lower(patches: &[Coord]) -> Vec<Coord> {
-    let before = |patch: &Coord, n: i32| [patch[0] - (n >> 2), patch[1] - (n >> 1 & 1), patch[2] - (n & 1)];
-    patches.iter().flat_map(|patch| (0..8).map(move |n| before(patch, n))).collect()
 }
 
 fn crossings(phi: &Implicit, patch: usize) -> Crossings {
@@ -176,13 +171,9 @@ fn zero(outside: [Option<f32>; 2], here: f32, there: f32) -> f32 {
 /// The triangles in the cubes that begin at the nodes of a patch.
 fn triangles(phi: &Implicit, patch: Coord, crossings: &[Crossings], first: &[u32]) -> Vec<[u32; 3]> {
     // Nodes 0..=4 on each axis lie in this patch and the seven behind it.
-    let near: [Option<usize>; 8] = std::array::from_fn(|n| {
-        phi.find([patch[0] + (n >> 2) as i32, patch[1] + (n >> 1 & 1) as i32, patch[2] + (n & 1) as i32])
-    });
-    let inside: [bool; 8] = std::array::from_fn(|n| {
-        let at = [patch[0] + (n >> 2) as i32, patch[1] + (n >> 1 & 1) as i32, patch[2] + (n & 1) as i32];
-        near[n].is_none() && phi.is_inside(at)
-    });
+    let patches = nodes_of(patch);
+    let near = patches.map(|at| phi.find(at));
+    let inside: [bool; 8] = std::array::from_fn(|n| near[n].is_none() && phi.is_inside(patches[n]));
     let part = |node: [usize; 3]| (node[0] >> 2) << 2 | (node[1] >> 2) << 1 | node[2] >> 2;
     let local = |node: [usize; 3]| (node[0] & 3) << 4 | (node[1] & 3) << 2 | node[2] & 3;
     let mut signs = [[[false; 5]; 5]; 5];

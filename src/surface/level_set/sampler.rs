@@ -1,8 +1,7 @@
 //! Tricubic interpolation of signed distances (Catmull-Rom splines on each axis), with its gradient.
 
 use super::band::Distances;
-use crate::geometry::Coord;
-use crate::geometry::DVec3;
+use crate::geometry::{Coord, DVec3};
 
 /// Samples distances at one position after another; nodes are cached while positions stay in a cell.
 pub struct Sampler<'a> {

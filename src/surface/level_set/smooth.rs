@@ -8,8 +8,10 @@ use rayon::prelude::*;
 
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::check::topology::Sets;
+use crate::geometry::lists::Lists;
+use crate::geometry::shape::six_volumes;
 use crate::geometry::{DVec3, TriMesh};
-use crate::surface::particles::specks::root;
 
 /// Frequency (0 to 2; 0 is a constant) up to which a pass removes nothing: k_PB.
 const PASS_BAND: f64 = 0.01;
@@ -30,7 +32,9 @@ const PIECE: usize = 1024;
 /// # Errors
 /// Cancel.
 pub fn smooth(ctx: &Context, mesh: &mut TriMesh, passes: u32) -> Result<()> {
-    let rings = Rings::of(mesh);
+    // A closed mesh uses each edge once in each direction: every vertex has each of its neighbours once.
+    let edges = mesh.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
+    let rings = Lists::new(mesh.positions.len(), edges);
     let parts = Parts::of(mesh);
     let mut positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
     let volumes = parts.volumes(&positions, &mesh.triangles, &parts.centres(&positions));
@@ -38,55 +42,28 @@ pub fn smooth(ctx: &Context, mesh: &mut TriMesh, passes: u32) -> Result<()> {
     let mut is_done = vec![false; reaches.len()];
     for _ in 0..passes {
         ctx.check()?;
-        let mut moved = rings.moved(&rings.moved(&positions, SHRINK), GROW);
-        parts.restore(&mut moved, &mesh.triangles, &volumes);
-        for (is_done, (now, first)) in is_done.iter_mut().zip(parts.reaches(&moved).iter().zip(&reaches)) {
+        let mut next = moved(&rings, &moved(&rings, &positions, SHRINK), GROW);
+        parts.restore(&mut next, &mesh.triangles, &volumes);
+        for (is_done, (now, first)) in is_done.iter_mut().zip(parts.reaches(&next).iter().zip(&reaches)) {
             *is_done |= *now > FARTHEST * first;
         }
-        parts.take(&mut positions, &moved, &is_done);
+        parts.take(&mut positions, &next, &is_done);
     }
     mesh.positions = positions.iter().map(|position| position.cast()).collect();
     Ok(())
 }
 
-/// The neighbours of each vertex, one vertex after another.
-struct Rings {
-    /// For each vertex its first neighbour; then the count of all.
-    starts: Vec<u32>,
-    neighbours: Vec<u32>,
-}
-
-impl Rings {
-    /// A closed mesh uses each edge once in each direction: every vertex has each of its neighbours once.
-    fn of(mesh: &TriMesh) -> Self {
-        let edges = || mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-        let mut starts = vec![0u32; mesh.positions.len() + 1];
-        edges().for_each(|[from, _]| starts[from as usize + 1] += 1);
-        for vertex in 1..starts.len() {
-            starts[vertex] += starts[vertex - 1];
+/// Positions after a step by a fraction of the displacement toward the means of the neighbours.
+fn moved(rings: &Lists<u32>, positions: &[DVec3], share: f64) -> Vec<DVec3> {
+    let step = |(vertex, here): (usize, &DVec3)| {
+        let ring = rings.get(vertex);
+        if ring.is_empty() {
+            return *here;
         }
-        let mut ends = starts.clone();
-        let mut neighbours = vec![0; mesh.triangles.len() * 3];
-        for [from, to] in edges() {
-            let end = &mut ends[from as usize];
-            neighbours[*end as usize] = to;
-            *end += 1;
-        }
-        Self { starts, neighbours }
-    }
-
-    /// Positions after a step by a fraction of the displacement toward the means of the neighbours.
-    fn moved(&self, positions: &[DVec3], share: f64) -> Vec<DVec3> {
-        let step = |(vertex, here): (usize, &DVec3)| {
-            let ring = &self.neighbours[self.starts[vertex] as usize..self.starts[vertex + 1] as usize];
-            if ring.is_empty() {
-                return *here;
-            }
-            let sum: DVec3 = ring.iter().map(|&at| positions[at as usize]).sum();
-            here + (sum / ring.len() as f64 - here) * share
-        };
-        positions.par_iter().enumerate().with_min_len(PIECE).map(step).collect()
-    }
+        let sum: DVec3 = ring.iter().map(|&at| positions[at as usize]).sum();
+        here + (sum / ring.len() as f64 - here) * share
+    };
+    positions.par_iter().enumerate().with_min_len(PIECE).map(step).collect()
 }
 
 /// The connected parts of a mesh.
@@ -98,22 +75,13 @@ struct Parts {
 
 impl Parts {
     fn of(mesh: &TriMesh) -> Self {
-        let mut parent: Vec<u32> = (0..mesh.positions.len() as u32).collect();
+        let mut sets = Sets::new(mesh.positions.len());
         for &[a, b, c] in &mesh.triangles {
-            for other in [b, c] {
-                let [one, two] = [a, other].map(|vertex| root(&mut parent, vertex));
-                // The lower one is the root: it comes first.
-                parent[one.max(two) as usize] = one.min(two);
-            }
+            sets.join(a, b);
+            sets.join(a, c);
         }
-        let mut of = vec![0; parent.len()];
-        let mut count = 0;
-        for vertex in 0..parent.len() {
-            let root = root(&mut parent, vertex as u32) as usize;
-            of[vertex] = if root == vertex { count } else { of[root] };
-            count += u32::from(root == vertex);
-        }
-        Self { of, count: count as usize }
+        let (of, count) = sets.numbered();
+        Self { of, count }
     }
 
     /// The mean of each part's vertices.
@@ -152,8 +120,8 @@ impl Parts {
         let mut volumes = vec![0.0; self.count];
         for triangle in triangles {
             let part = self.of[triangle[0] as usize] as usize;
-            let [a, b, c] = triangle.map(|vertex| positions[vertex as usize] - centres[part]);
-            volumes[part] += a.dot(&b.cross(&c)) / 6.0;
+            let corners = triangle.map(|vertex| positions[vertex as usize]);
+            volumes[part] += six_volumes(&corners, &centres[part]) / 6.0;
         }
         volumes
     }
@@ -177,8 +145,8 @@ impl Parts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
     use crate::geometry::Vec3;
+    use crate::surface::test_particles::context;
 
     /// An octahedron with its corners at a distance `size` (m) from a centre.
     fn octahedron(centre: [f32; 3], size: f32) -> TriMesh {
@@ -222,7 +190,7 @@ mod tests {
 
     #[test]
     fn a_small_drop_and_a_small_cavity_become_no_needles() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         for (mut mesh, corners) in [(spindle(1, 6).reversed(), 8), (spindle(2, 4), 10)] {
             assert!(mesh.is_closed() && mesh.positions.len() == corners);
             let far = |mesh: &TriMesh| {
@@ -238,7 +206,7 @@ mod tests {
 
     #[test]
     fn the_smallest_drop_and_its_larger_neighbour_keep_their_volumes() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let mut mesh = octahedron([0.0; 3], 0.01);
         mesh.append(&octahedron([5.0, 1.0, 0.0], 0.02));
         // A corner that sticks out.

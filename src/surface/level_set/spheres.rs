@@ -5,7 +5,8 @@ use rayon::prelude::*;
 use super::openvdb::HALF_WIDTH;
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::geometry::DVec3;
+use crate::geometry::coords::{around, cell_of};
+use crate::geometry::{Coord, DVec3};
 use crate::numeric::blocks::{DIM, VOXELS};
 use crate::vdb::FloatGrid;
 use crate::vdb::level_set::from_particles;
@@ -60,13 +61,10 @@ pub fn spheres(ctx: &Context, positions: &[DVec3], radius: f64, cell: f64) -> Re
 fn most_blocks(positions: &[DVec3], reach: f64, cell: f64) -> u64 {
     let blocks = (reach / DIM as f64).ceil();
     let edge = blocks * DIM as f64 * cell;
-    let cube = |position: &DVec3| [0, 1, 2].map(|axis| (position[axis] / edge).floor() as i32);
-    let mut cubes: Vec<[i32; 3]> = positions.par_iter().map(cube).collect();
+    let mut cubes: Vec<Coord> = positions.par_iter().map(|position| cell_of(&(position / edge))).collect();
     cubes.par_sort_unstable();
     cubes.dedup();
-    let around =
-        |[x, y, z]: [i32; 3]| (0..27).map(move |n| [x + n / 9 - 1, y + n / 3 % 3 - 1, z + n % 3 - 1]);
-    let mut cubes: Vec<[i32; 3]> = cubes.into_iter().flat_map(around).collect();
+    let mut cubes: Vec<Coord> = cubes.into_iter().flat_map(around).collect();
     cubes.par_sort_unstable();
     cubes.dedup();
     cubes.len() as u64 * (blocks as u64).pow(3)
@@ -75,16 +73,12 @@ fn most_blocks(positions: &[DVec3], reach: f64, cell: f64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
+    use crate::surface::test_particles::context;
     use crate::vdb::level_set::{measure, to_mesh};
-
-    fn context() -> Context {
-        Context::new(Pool::new(2).unwrap())
-    }
 
     #[test]
     fn a_sphere_has_its_volume_and_two_apart_have_twice_that() {
-        let ctx = context();
+        let ctx = context(2);
         let ball = 4.0 / 3.0 * std::f64::consts::PI * 0.2f64.powi(3);
         for (positions, count) in
             [(vec![DVec3::repeat(0.013)], 1.0), (vec![DVec3::zeros(), DVec3::new(0.5, 0.0, 0.0)], 2.0)]
@@ -100,7 +94,7 @@ mod tests {
 
     #[test]
     fn the_least_sphere_is_there_and_what_is_out_of_range_is_refused() {
-        let ctx = context();
+        let ctx = context(2);
         // Rounding takes a quotient of 1.5 below that.
         for cell in [0.05, 0.0333, 0.7] {
             let grid = spheres(&ctx, &[DVec3::zeros()], 1.5 * cell, cell).unwrap();
@@ -113,7 +107,7 @@ mod tests {
         assert!(said(&[DVec3::zeros()], 11.0, &ctx).contains("1.5 to 100"));
         assert!(said(&[DVec3::zeros(), DVec3::repeat(1e9)], 0.2, &ctx).contains("particle 2"));
         assert!(said(&[DVec3::repeat(f64::NAN)], 0.2, &ctx).contains("particle 1"));
-        let small = context();
+        let small = context(2);
         small.set_memory_limit(1 << 16);
         assert!(said(&[DVec3::zeros()], 0.2, &small).contains("limit"));
     }

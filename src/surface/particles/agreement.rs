@@ -3,9 +3,9 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::grid::cell_of;
 use super::paths::Paths;
 use crate::error::Result;
+use crate::geometry::coords::{around, cell_of};
 use crate::geometry::{Coord, DVec3};
 use crate::surface::Particles;
 use crate::surface::report::StepReport;
@@ -152,14 +152,6 @@ fn velocities_miss(from: &Particles, to: &Particles, dt: f64, spacing: f64) -> O
 /// A subset of `count` particles, evenly spaced.
 fn samples(count: usize) -> impl Iterator<Item = usize> + Clone {
     (0..count).step_by(count.div_ceil(SAMPLES).max(1))
-}
-
-/// A cell and the 26 around it.
-fn around(cell: Coord) -> [Coord; 27] {
-    std::array::from_fn(|n| {
-        let n = n as i32;
-        [cell[0] + n / 9 - 1, cell[1] + n / 3 % 3 - 1, cell[2] + n % 3 - 1]
-    })
 }
 
 #[cfg(test)]

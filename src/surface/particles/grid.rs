@@ -5,11 +5,6 @@ use rayon::prelude::*;
 use crate::error::{Error, Result};
 use crate::geometry::{Coord, DVec3};
 
-/// The cell that holds a position (cells).
-pub fn cell_of(position: &DVec3) -> Coord {
-    [0, 1, 2].map(|axis| position[axis].floor() as i32)
-}
-
 /// Messages about particles too far apart begin with this.
 pub const TOO_FAR: &str = "particles reach";
 /// Bits of each axis in a key.

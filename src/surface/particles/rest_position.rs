@@ -6,9 +6,11 @@ use super::affine_fit::{Near, sums};
 use super::grid::Cells;
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::shape::bounds;
 use crate::geometry::{Coord, DVec3};
 use crate::mesh_repair::Source;
 use crate::surface::Particles;
+use crate::surface::pieces::in_pieces;
 use crate::surface::topology::change::Change;
 use crate::surface::tracked_mesh::Tracker;
 
@@ -75,15 +77,10 @@ impl Rest {
         ctx.phase("rest", || {
             let field = Field::of(self, now, spacing, at)?;
             ctx.check()?;
-            let parts: Vec<Vec<Option<DVec3>>> = at
-                .par_chunks(PIECE)
-                .map(|piece| {
-                    ctx.check()?;
-                    let mut scratch = Scratch::default();
-                    Ok(piece.iter().map(|position| field.first(*position, &mut scratch)).collect())
-                })
-                .collect::<Result<_>>()?;
-            Ok(parts.concat())
+            in_pieces(ctx, at, PIECE, |_, piece| {
+                let mut scratch = Scratch::default();
+                piece.iter().map(|position| field.first(*position, &mut scratch)).collect()
+            })
         })
     }
 
@@ -160,9 +157,8 @@ struct Field {
 impl Field {
     fn of(rest: &Rest, now: &Particles, spacing: f64, at: &[DVec3]) -> Result<Self> {
         let reach = DVec3::repeat(f64::from(RADIUS << DOUBLINGS) * spacing);
-        let first = at.first().copied().unwrap_or_default();
-        let low = at.iter().fold(first, |low, position| low.inf(position)) - reach;
-        let high = at.iter().fold(first, |high, position| high.sup(position)) + reach;
+        let (low, high) = bounds(at);
+        let (low, high) = (low - reach, high + reach);
         let is_near = |particle: &u32| {
             let position = now.positions[*particle as usize];
             (0..3).all(|axis| low[axis] <= position[axis] && position[axis] <= high[axis])
@@ -255,8 +251,7 @@ fn heaviest_origin(seen: &mut [Seen], most: f64) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
-    use crate::surface::test_particles::numbered;
+    use crate::surface::test_particles::{context, numbered};
 
     /// A block of n^3 positions, one apart, starting at a corner.
     fn block(corner: DVec3, n: i32) -> impl Iterator<Item = DVec3> {
@@ -276,7 +271,7 @@ mod tests {
 
     #[test]
     fn liquid_that_turned_and_stretched_is_found_where_it_was() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let spacing = 0.01;
         let first = numbered(block(DVec3::zeros(), 9).map(|position| position * spacing).collect());
         let rest = Rest::of(&first).unwrap();
@@ -299,7 +294,7 @@ mod tests {
         }
         assert_eq!(found[wanted.len()..], [None, None]);
         // One by one, and on one thread, the results are the same bit for bit.
-        let alone = Context::new(Pool::new(0).unwrap());
+        let alone = context(0);
         for (position, found) in at.iter().zip(&found) {
             assert_eq!(rest.positions(&alone, &now, spacing, &[*position]).unwrap(), [*found]);
         }
@@ -314,7 +309,7 @@ mod tests {
 
     #[test]
     fn a_position_between_liquids_that_came_together_was_in_one_of_the_two() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         // Two blocks with a gap of 5 between them, which closes to one spacing, and to a half.
         for deep in [0.0, 0.5] {
             let ways = [DVec3::new(2.0 + 0.5 * deep, 0.0, 0.0), DVec3::new(-2.0 - 0.5 * deep, 0.0, 0.0)];

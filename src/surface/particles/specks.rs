@@ -3,6 +3,8 @@
 use super::grid::Cells;
 use crate::error::Result;
 use crate::geometry::DVec3;
+use crate::geometry::check::topology::Sets;
+use crate::geometry::coords::around;
 
 /// Which particles at positions (m), whose spacing is `spacing` (m), belong to groups of fewer than `least`. Two particles are in the same
 /// group if the cells of one spacing that hold them touch.
@@ -12,38 +14,27 @@ use crate::geometry::DVec3;
 pub fn specks(positions: &[DVec3], spacing: f64, least: usize) -> Result<Vec<bool>> {
     let cells = Cells::new(positions, spacing, i64::from)?;
     let runs: Vec<&[u32]> = cells.runs().collect();
-    let mut parent: Vec<u32> = (0..runs.len() as u32).collect();
+    let mut sets = Sets::new(runs.len());
     for (cell, coord) in cells.coords().enumerate() {
-        for n in 0..27 {
-            let near = [coord[0] + n / 9 - 1, coord[1] + n / 3 % 3 - 1, coord[2] + n % 3 - 1];
+        for near in around(coord) {
             // Each pair of cells is found once, from its lower cell.
             if near > coord
                 && let Some(other) = cells.find(near)
             {
-                let [a, b] = [cell as u32, other as u32].map(|at| root(&mut parent, at));
-                parent[a.max(b) as usize] = a.min(b);
+                sets.join(cell as u32, other as u32);
             }
         }
     }
-    let roots: Vec<u32> = (0..runs.len() as u32).map(|cell| root(&mut parent, cell)).collect();
-    let mut counts = vec![0; runs.len()];
-    roots.iter().zip(&runs).for_each(|(root, run)| counts[*root as usize] += run.len());
+    let (groups, count) = sets.numbered();
+    let mut counts = vec![0; count];
+    groups.iter().zip(&runs).for_each(|(group, run)| counts[*group as usize] += run.len());
     let mut out = vec![false; positions.len()];
-    for (root, run) in roots.iter().zip(&runs) {
-        if counts[*root as usize] < least {
+    for (group, run) in groups.iter().zip(&runs) {
+        if counts[*group as usize] < least {
             run.iter().for_each(|particle| out[*particle as usize] = true);
         }
     }
     Ok(out)
-}
-
-/// The root of a group in a forest of parents.
-pub fn root(parent: &mut [u32], mut at: u32) -> u32 {
-    while parent[at as usize] != at {
-        parent[at as usize] = parent[parent[at as usize] as usize];
-        at = parent[at as usize];
-    }
-    at
 }
 
 #[cfg(test)]

@@ -75,11 +75,11 @@ pub fn transfer(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
+    use crate::surface::test_particles::context;
 
     #[test]
     fn a_linear_field_is_met_in_the_middle_and_far_vertices_have_the_nearest() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let positions: Vec<DVec3> = (0..1000)
             .map(|n| DVec3::new(f64::from(n % 10), f64::from(n / 10 % 10), f64::from(n / 100)) * 0.1)
             .collect();

@@ -1,9 +1,10 @@
 //! Which end of a short edge is merged into the other, and whether it may be.
 
 use super::improvable::{between, mean};
-use super::shape::{is_upright, normal, quality};
+use super::shape::{is_upright, quality};
 use super::vertex_rings::{Collapse, VertexRings};
 use crate::geometry::DVec3;
+use crate::geometry::shape::normal;
 
 /// Minimum spread of normals on a ridge or in a corner: that of two planes of the same area that meet at 30 degrees.
 const SPREAD: f64 = 0.0625;

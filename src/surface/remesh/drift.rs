@@ -46,8 +46,7 @@ impl Drift {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::{Context, Pool};
-    use crate::surface::test_particles::{numbered, own_surface, shell};
+    use crate::surface::test_particles::{context, numbered, own_surface, shell};
     use crate::surface::{Params, Particles, Tracker};
 
     /// Frames in which the liquid is stretched, and those in which it rests.
@@ -56,7 +55,7 @@ mod tests {
 
     #[test]
     fn a_mesh_that_was_drawn_out_keeps_every_triangle_when_its_particles_only_tremble() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let positions = shell(DVec3::zeros(), 0.0, 4.2);
         let mut seed = 1u64;
         let mut chance = || {

@@ -1,8 +1,10 @@
 //! Whether an edge should be flipped.
 
 use super::improvable::TOO_LONG;
-use super::shape::{is_upright, least_angle, normal};
-use super::vertex_rings::{Edge, VertexRings, flipped};
+use super::shape::{is_upright, least_angle};
+use super::vertex_rings::{Edge, VertexRings};
+use crate::geometry::fans::flipped;
+use crate::geometry::shape::normal;
 
 /// Triangles whose smallest angle (degrees) is at least this are left alone.
 const LEAST: f64 = 20.0;

@@ -22,12 +22,11 @@ mod shape;
 mod strain;
 mod vertex_rings;
 
-pub use improvable::{Improvable, Size};
-use rayon::prelude::*;
-
 use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::DVec3;
+use crate::surface::pieces::in_pieces;
+pub use improvable::{Improvable, Size};
 use improvable::{is_long, is_short};
 use vertex_rings::VertexRings;
 
@@ -89,19 +88,11 @@ pub fn sizes(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<Size> {
 
 /// Triangles that may be due, ascending.
 fn due(ctx: &Context, mesh: &Improvable<'_>) -> Result<Vec<u32>> {
-    let parts: Vec<Vec<u32>> = mesh
-        .triangles
-        .par_chunks(GRAIN)
-        .zip(mesh.sources.par_chunks(GRAIN))
-        .enumerate()
-        .map(|(chunk, (triangles, sources))| {
-            ctx.check()?;
-            let all = ((chunk * GRAIN) as u32..).zip(triangles.iter().zip(sources));
-            let due = all.filter(|(_, (corners, source))| mesh.is_due(**corners, **source));
-            Ok(due.map(|(triangle, _)| triangle).collect())
-        })
-        .collect::<Result<_>>()?;
-    Ok(parts.concat())
+    in_pieces(ctx, mesh.triangles, GRAIN, |first, triangles| {
+        let all = (first as u32..).zip(triangles.iter().zip(&mesh.sources[first..]));
+        let due = all.filter(|(_, (corners, source))| mesh.is_due(**corners, **source));
+        due.map(|(triangle, _)| triangle).collect()
+    })
 }
 
 /// Adds triangles to others; ascending, each once.

@@ -1,8 +1,9 @@
 //! Vertices created in this frame move along the surface toward the middle of their neighbours: edges and angles become even.
 
-use super::shape::{is_upright, least_angle, normal};
+use super::shape::{is_upright, least_angle};
 use super::vertex_rings::VertexRings;
 use crate::geometry::DVec3;
+use crate::geometry::shape::normal;
 
 /// Fraction of the displacement to the neighbours' middle that a vertex moves at once.
 const SHARE: f64 = 0.5;

@@ -1,20 +1,14 @@
 //! Shapes of triangles.
 
 use crate::geometry::DVec3;
+use crate::geometry::shape::{altitude, normal};
 
 /// Minimum cosine between the normals of a triangle before and after a change: below it the triangle turns over.
 const UPRIGHT: f64 = 0.2;
 
-/// A normal of a triangle, as long as twice its area.
-pub(super) fn normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
-    (b - a).cross(&(c - a))
-}
-
-/// Altitude of a triangle on its longest edge, over that edge: 0.87 at best, 0 where all corners are at one position.
+/// Altitude of a triangle on its longest edge, over that edge.
 pub(super) fn quality(corners: &[DVec3; 3]) -> f64 {
-    let [a, b, c] = corners;
-    let square = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
-    if square > 0.0 { normal(corners).norm() / square } else { 0.0 }
+    altitude(corners, 0.0)
 }
 
 /// Smallest angle of a triangle (degrees): that between its two longest edges. 0 if one of these has no length.

@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use super::shape::{least_angle, normal};
+use super::shape::least_angle;
 use super::*;
-use crate::context::Pool;
 use crate::error::Error;
 use crate::geometry::check::topology::Topology;
+use crate::geometry::shape::normal;
 use crate::geometry::test_meshes;
 use crate::mesh_repair::Source;
+use crate::surface::test_particles::context;
 
 /// The drift of a vertex of which nothing is known: so large that no edge rests, and, unlike NaN, equal to itself.
 const UNKNOWN: [f32; 3] = [f32::INFINITY; 3];
@@ -76,7 +77,7 @@ impl Body {
     /// Improves it and checks the invariants.
     fn improved(mut self, threads: usize) -> (Self, Improvements) {
         let before = self.clone();
-        let ctx = Context::new(Pool::new(threads).unwrap());
+        let ctx = context(threads);
         let done = ctx.phase("improve", || improve(&ctx, &mut self.improvable())).unwrap();
         self.check();
         for vertex in 0..self.positions.len() {
@@ -315,7 +316,7 @@ fn folds_go() {
 
 #[test]
 fn nothing_stays_nothing_and_cancel_leaves_a_mesh_as_it_was() {
-    let ctx = Context::new(Pool::new(1).unwrap());
+    let ctx = context(1);
     let mut nothing = Body::of(Vec::new(), Vec::new());
     assert_eq!(improve(&ctx, &mut nothing.improvable()).unwrap(), Improvements::default());
     ctx.cancel();

@@ -1,13 +1,11 @@
 //! A closed mesh that is being improved, with the triangles around its vertices. Splits, collapses and flips keep it a closed 2-manifold by
-//! index: two neighbours are merged only if the link condition holds (Dey, Edelsbrunner, Guha and Nekhayev 1999, "Topology preserving edge
-//! contraction").
+//! index ([`Fans`]).
 
 use super::improvable::{Improvable, Size, mean};
 use crate::geometry::DVec3;
+use crate::geometry::fans::{Fans, flipped};
+use crate::geometry::mesh::{drop_marked, renumber_kept};
 use crate::mesh_repair::Source;
-
-/// For a vertex around which no triangle was added or removed.
-const NONE: u32 = u32::MAX;
 
 /// An edge with its triangles and corners.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,24 +27,10 @@ pub(super) struct Collapse {
     pub size: Size,
 }
 
-/// The corners of an edge's two triangles after it was flipped.
-pub(super) fn flipped([a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
-    [[c, a, d], [d, b, c]]
-}
-
 /// A mesh with the triangles around each vertex.
 pub(super) struct VertexRings<'m, 'a> {
     mesh: &'m mut Improvable<'a>,
-    /// For each input vertex, where its triangles begin in `first`; then the count of all.
-    starts: Vec<u32>,
-    /// Triangles around each input vertex, ascending.
-    first: Vec<u32>,
-    /// For each vertex, the index of its triangles in `own`; [`NONE`]: they are those of the input.
-    slots: Vec<u32>,
-    /// Triangles around vertices where some were added or removed, in no order.
-    own: Vec<Vec<u32>>,
-    /// For each triangle, whether a collapse has removed it.
-    is_dead: Vec<bool>,
+    fans: Fans,
     /// For each vertex, whether it was merged into another.
     is_gone: Vec<bool>,
     /// Triangles changed since the last call of `take_touched`, each once.
@@ -58,27 +42,9 @@ impl<'m, 'a> VertexRings<'m, 'a> {
     /// Takes two passes over all triangles.
     pub fn of(mesh: &'m mut Improvable<'a>) -> Self {
         let (vertices, triangles) = (mesh.positions.len(), mesh.triangles.len());
-        let mut starts = vec![0u32; vertices + 1];
-        mesh.triangles.as_flattened().iter().for_each(|&corner| starts[corner as usize + 1] += 1);
-        for vertex in 1..starts.len() {
-            starts[vertex] += starts[vertex - 1];
-        }
-        let mut ends = starts.clone();
-        let mut first = vec![0; 3 * triangles];
-        for (triangle, corners) in (0..).zip(mesh.triangles.iter()) {
-            for &corner in corners {
-                let end = &mut ends[corner as usize];
-                first[*end as usize] = triangle;
-                *end += 1;
-            }
-        }
         Self {
+            fans: Fans::of(vertices, mesh.triangles, |_| true),
             mesh,
-            starts,
-            first,
-            slots: vec![NONE; vertices],
-            own: Vec::new(),
-            is_dead: vec![false; triangles],
             is_gone: vec![false; vertices],
             touched: Vec::new(),
             is_touched: vec![false; triangles],
@@ -87,7 +53,7 @@ impl<'m, 'a> VertexRings<'m, 'a> {
 
     /// Whether a triangle has not been removed by a collapse.
     pub fn is_there(&self, triangle: u32) -> bool {
-        !self.is_dead[triangle as usize]
+        !self.fans.are_dead()[triangle as usize]
     }
 
     /// Whether a triangle is unchanged in this frame: the artist's own, or from an earlier frame.
@@ -147,11 +113,7 @@ impl<'m, 'a> VertexRings<'m, 'a> {
 
     /// The triangles around a vertex; none if it was merged into another.
     pub fn around(&self, vertex: u32) -> &[u32] {
-        let at = vertex as usize;
-        match self.own.get(self.slots[at] as usize) {
-            Some(own) => own,
-            None => &self.first[self.starts[at] as usize..self.starts[at + 1] as usize],
-        }
+        self.fans.around(vertex)
     }
 
     /// The triangle with the directed edge from a vertex to a neighbour, and its third corner. None if they are not neighbours.
@@ -185,37 +147,20 @@ impl<'m, 'a> VertexRings<'m, 'a> {
         (last == first).then_some(ring)
     }
 
-    /// The neighbours of a vertex, ascending.
-    fn ring(&self, vertex: u32) -> Vec<u32> {
-        let corners = self.around(vertex).iter().flat_map(|&triangle| self.corners(triangle));
-        let mut ring: Vec<u32> = corners.filter(|&corner| corner != vertex).collect();
-        ring.sort_unstable();
-        ring.dedup();
-        ring
-    }
-
-    /// Whether two neighbours may be merged: their only common neighbours are the two corners opposite their edge, and these, which lose a
-    /// triangle each, keep three. That also preserves tetrahedra.
+    /// See [`Fans::may_join`].
     pub fn may_join(&self, a: u32, b: u32) -> bool {
-        let [mut shared, other] = [a, b].map(|vertex| self.ring(vertex));
-        shared.retain(|vertex| other.binary_search(vertex).is_ok());
-        shared.len() == 2 && shared.iter().all(|&corner| self.around(corner).len() > 3)
+        self.fans.may_join(self.mesh.triangles, a, b)
     }
 
     /// Whether two vertices are neighbours.
     pub fn are_neighbours(&self, a: u32, b: u32) -> bool {
-        self.around(a).iter().any(|&triangle| self.corners(triangle).contains(&b))
+        self.fans.are_neighbours(self.mesh.triangles, a, b)
     }
 
     /// Triangles with a corner that a collapse moves or renames, including those that it removes.
     pub fn moving(&self, collapse: &Collapse) -> Vec<u32> {
         let &Collapse { from, to, position, .. } = collapse;
-        let mut moving = self.around(from).to_vec();
-        if position != self.position(to) {
-            let others = self.around(to).iter().copied();
-            moving.extend(others.filter(|&triangle| !self.corners(triangle).contains(&from)));
-        }
-        moving
+        self.fans.moving(self.mesh.triangles, [from, to], position != self.position(to)).collect()
     }
 
     /// The triangles changed since the last call, ascending; collapses may have removed some.
@@ -239,22 +184,15 @@ impl<'m, 'a> VertexRings<'m, 'a> {
         self.mesh.origins.push(None);
         self.mesh.flags.push(false);
         self.is_gone.push(false);
-        self.slots.push(self.own.len() as u32);
-        self.own.push(vec![one, two, three, four]);
         for (triangle, near, far) in [(one, [a, made, c], [made, b, c]), (two, [b, made, d], [made, a, d])] {
             self.becomes_part(triangle);
             self.mesh.triangles[triangle as usize] = near;
             self.mesh.triangles.push(far);
             let source = self.mesh.sources[triangle as usize];
             self.mesh.sources.push(source);
-            self.is_dead.push(false);
             self.is_touched.push(false);
         }
-        self.remove(a, two);
-        self.remove(b, one);
-        for (vertex, triangle) in [(a, four), (b, three), (c, three), (d, four)] {
-            self.add(vertex, triangle);
-        }
+        self.fans.split([one, two], [three, four], edge.corners);
         [one, two, three, four].into_iter().for_each(|triangle| self.touch(triangle));
     }
 
@@ -268,34 +206,20 @@ impl<'m, 'a> VertexRings<'m, 'a> {
         self.mesh.positions[to as usize] = position;
         self.mesh.sizes[to as usize] = size;
         self.is_gone[from as usize] = true;
-        for triangle in std::mem::take(self.own_mut(from)) {
-            let corners = self.corners(triangle);
-            if corners.contains(&to) {
-                self.is_dead[triangle as usize] = true;
-                corners.into_iter().for_each(|corner| self.remove(corner, triangle));
-            } else {
-                let renamed = corners.map(|corner| if corner == from { to } else { corner });
-                self.mesh.triangles[triangle as usize] = renamed;
-                self.add(to, triangle);
-            }
-        }
+        self.fans.collapse(self.mesh.triangles, [from, to]);
         self.around(to).to_vec().into_iter().for_each(|triangle| self.touch(triangle));
     }
 
     /// Replaces an edge by the other diagonal of its two triangles. If these are parts of one triangle, they remain parts.
     pub fn flip(&mut self, edge: &Edge) {
-        let Edge { triangles: [one, two], corners: [a, b, c, d] } = *edge;
-        let sources = [one, two].map(|triangle| self.mesh.sources[triangle as usize]);
+        let sources = edge.triangles.map(|triangle| self.mesh.sources[triangle as usize]);
         let source = if sources[0] == sources[1] { sources[0] } else { Source::New };
-        for (triangle, corners) in [one, two].into_iter().zip(flipped(edge.corners)) {
+        for (triangle, corners) in edge.triangles.into_iter().zip(flipped(edge.corners)) {
             self.mesh.triangles[triangle as usize] = corners;
             self.mesh.sources[triangle as usize] = source;
             self.touch(triangle);
         }
-        self.remove(a, two);
-        self.remove(b, one);
-        self.add(c, two);
-        self.add(d, one);
+        self.fans.flip(edge.triangles, edge.corners);
     }
 
     /// The drift of a vertex between two others.
@@ -317,54 +241,21 @@ impl<'m, 'a> VertexRings<'m, 'a> {
         }
     }
 
-    /// The triangles around a vertex, for modification.
-    fn own_mut(&mut self, vertex: u32) -> &mut Vec<u32> {
-        let at = vertex as usize;
-        if self.slots[at] == NONE {
-            let own = self.around(vertex).to_vec();
-            self.slots[at] = self.own.len() as u32;
-            self.own.push(own);
-        }
-        &mut self.own[self.slots[at] as usize]
-    }
-
-    fn add(&mut self, vertex: u32, triangle: u32) {
-        self.own_mut(vertex).push(triangle);
-    }
-
-    fn remove(&mut self, vertex: u32, triangle: u32) {
-        self.own_mut(vertex).retain(|&other| other != triangle);
-    }
-
     /// Drops the triangles and vertices that collapses removed. All others keep their order.
     pub fn finish(self) {
-        let Self { mesh, is_dead, is_gone, .. } = self;
+        let Self { mesh, fans, is_gone, .. } = self;
         if !is_gone.contains(&true) {
             return;
         }
-        drop_marked(mesh.triangles, &is_dead);
-        drop_marked(mesh.sources, &is_dead);
+        drop_marked(mesh.triangles, fans.are_dead());
+        drop_marked(mesh.sources, fans.are_dead());
         drop_marked(mesh.positions, &is_gone);
         drop_marked(mesh.sizes, &is_gone);
         drop_marked(mesh.drifts, &is_gone);
         drop_marked(mesh.origins, &is_gone);
         drop_marked(mesh.flags, &is_gone);
-        let mut numbers = vec![0; is_gone.len()];
-        let mut kept = 0u32;
-        for (number, is_gone) in numbers.iter_mut().zip(&is_gone) {
-            *number = kept;
-            kept += u32::from(!is_gone);
-        }
-        for corners in mesh.triangles.iter_mut() {
-            *corners = corners.map(|corner| numbers[corner as usize]);
-        }
+        renumber_kept(mesh.triangles.as_flattened_mut(), &is_gone);
     }
-}
-
-/// Drops values whose mark is set.
-fn drop_marked<T>(values: &mut Vec<T>, marks: &[bool]) {
-    let mut marks = marks.iter();
-    values.retain(|_| marks.next() == Some(&false));
 }
 
 #[cfg(test)]
@@ -445,7 +336,7 @@ mod tests {
         let mut body = cube();
         let mut mesh = body.improvable();
         let mut rings = VertexRings::of(&mut mesh);
-        let (count, first) = (rings.around(0).len(), rings.ring(0)[0]);
+        let (count, first) = (rings.around(0).len(), rings.fans.ring(rings.mesh.triangles, 0)[0]);
         let ring = rings.ring_from(0, first, 24).unwrap();
         assert_eq!((ring.len(), ring[0]), (count, first));
         for n in 0..count {

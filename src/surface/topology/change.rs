@@ -7,15 +7,14 @@ use super::particle_count::ParticleCountTest;
 use crate::context::Context;
 use crate::distance::lattice::Lattice;
 use crate::error::Result;
-use crate::geometry::Coord;
 use crate::geometry::DVec3;
 use crate::geometry::check::topology::around;
-use crate::geometry::mesh::used;
+use crate::geometry::coords::{cell_of, cells_at, plus};
+use crate::geometry::mesh::compact;
 use crate::mesh_repair::{CellSet, Pierces, Rebuilt, Shape, Source, ladder, overlaps};
 use crate::surface::level_set::band::Distances;
 use crate::surface::level_set::implicit::Implicit;
 use crate::surface::level_set::sampler::Sampler;
-use crate::surface::particles::grid::cell_of;
 use crate::surface::remesh::{Improvable, Improvements, Size, improve};
 use crate::surface::track::project::foot;
 
@@ -33,7 +32,7 @@ pub struct Unfit<'a> {
 }
 
 /// A changed mesh.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Change {
     /// Positions of vertices (m): those that stayed, in their order, then new ones.
     pub vertices: Vec<DVec3>,
@@ -79,8 +78,7 @@ const BORN: [f64; 2] = [1.0, 1.0];
 impl Change {
     /// The change of a mesh that is removed entirely.
     pub(in crate::surface) fn to_nothing(unfit: &Unfit<'_>) -> Self {
-        let (vertices, triangles, origins, sources) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { vertices, triangles, origins, sources, ..Self::nothing(unfit) }
+        Self { before: unfit.vertices.to_vec(), ..Self::default() }
     }
 
     /// The change of a mesh that stays as it is.
@@ -90,17 +88,7 @@ impl Change {
             triangles: unfit.triangles.to_vec(),
             origins: (0..unfit.vertices.len() as u32).map(Some).collect(),
             sources: (0..unfit.triangles.len() as u32).map(Source::Whole).collect(),
-            before: unfit.vertices.to_vec(),
-            delta: Vec::new(),
-            sizes: Vec::new(),
-            drifts: Vec::new(),
-            improvements: Improvements::default(),
-            dry: 0,
-            specks: 0,
-            flagged_cells: 0,
-            rebuilt_cells: 0,
-            rung: 0,
-            iterations: 0,
+            ..Self::to_nothing(unfit)
         }
     }
 
@@ -181,15 +169,12 @@ pub fn change(
         ctx.phase("match", || Gamma::matched(ctx, &shape, &in_cells, &lattice, &flagged, (phi, distances)))?;
     let mut set = flagged.clone();
     for node in gamma.turned() {
-        for n in 0..8 {
-            set.add([node[0] - (n >> 2), node[1] - (n >> 1 & 1), node[2] - (n & 1)]);
-        }
+        cells_at(node).into_iter().for_each(|cell| _ = set.add(cell));
     }
     let rebuilt = ctx.phase("rebuild", || ladder(ctx, &shape, (&in_cells, &lattice), &set, &gamma))?;
     let Rebuilt { draft, cells, rung, .. } = rebuilt;
     let own = unfit.vertices.len();
-    let names = used(draft.positions.len(), &draft.triangles)
-        .unwrap_or_else(|| (0..draft.positions.len() as u32).collect());
+    let (names, triangles) = compact(draft.positions.len(), &draft.triangles);
     let origin = DVec3::from(lattice.origin.map(f64::from));
     let position = |name: &u32| match unfit.vertices.get(*name as usize) {
         Some(position) => *position,
@@ -198,20 +183,15 @@ pub fn change(
     let vertices = names.iter().map(position).collect();
     Ok(Some(Change {
         vertices,
-        triangles: crate::geometry::mesh::renumbered(&draft.triangles, &names),
+        triangles,
         origins: names.iter().map(|name| ((*name as usize) < own).then_some(*name)).collect(),
         sources: draft.sources,
         before: unfit.vertices.to_vec(),
-        delta: Vec::new(),
-        sizes: Vec::new(),
-        drifts: Vec::new(),
-        improvements: Improvements::default(),
-        dry: 0,
-        specks: 0,
         flagged_cells: flagged.count(),
         rebuilt_cells: cells,
         rung,
         iterations: gamma.iterations,
+        ..Change::default()
     }))
 }
 
@@ -275,8 +255,7 @@ fn flagged(unfit: &Unfit<'_>, shape: &Shape, lattice: &Lattice) -> CellSet {
         }
     }
     for position in unfit.bare {
-        let cell: Coord = cell_of(position);
-        set.add([0, 1, 2].map(|axis| cell[axis] - lattice.origin[axis]));
+        set.add(plus(cell_of(position), lattice.origin.map(|at| -at)));
     }
     overlaps(shape, DEEP, &mut set);
     set
@@ -285,14 +264,13 @@ fn flagged(unfit: &Unfit<'_>, shape: &Shape, lattice: &Lattice) -> CellSet {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
     use crate::geometry::check::faults::Faults;
-    use crate::surface::test_particles::{own_surface, two_balls};
+    use crate::surface::test_particles::{context, own_surface, two_balls};
     use crate::surface::{Params, Tracker};
 
     #[test]
     fn two_balls_become_one_and_part_again() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         // Together and apart, with a hollow in time to merge.
         let away = |frame: i32| 9.0 - 0.25 * f64::from(if frame < 24 { frame } else { 48 - frame });
         let at = |frame: i32| two_balls(5.5, DVec3::new(away(frame), 0.1, 0.2));

@@ -12,11 +12,12 @@ use super::uncovered_parts::Parts;
 use crate::context::Context;
 use crate::distance::triangle::Triangle;
 use crate::error::Result;
-use crate::geometry::Coord;
-use crate::geometry::DVec3;
+use crate::geometry::coords::{around, between, cell_of};
+use crate::geometry::shape::longest_first;
+use crate::geometry::{Coord, DVec3};
 use crate::surface::level_set::implicit::{Implicit, SIDE};
 use crate::surface::level_set::isosurface::Isosurface;
-use crate::surface::particles::grid::cell_of;
+use crate::surface::pieces::in_pieces;
 
 /// A position of the surface is covered if a triangle of feet is within this distance (spacings; a cell at least).
 const SLACK: f64 = 0.5;
@@ -65,15 +66,9 @@ impl Cover<'_> {
             let mut near = bins.near(foot).map(|position| (bare[position as usize] - foot).norm());
             near.any(|distance| distance <= reach).then_some(())
         };
-        let flags: Vec<Vec<bool>> = self
-            .feet
-            .par_chunks(GRAIN)
-            .map(|feet| {
-                ctx.check()?;
-                Ok(feet.iter().map(|foot| is_beside(foot).is_some()).collect())
-            })
-            .collect::<Result<_>>()?;
-        Ok((flags.concat(), bare))
+        let are_beside =
+            |_, feet: &[Option<DVec3>]| feet.iter().map(|foot| is_beside(foot).is_some()).collect();
+        Ok((in_pieces(ctx, self.feet, GRAIN, are_beside)?, bare))
     }
 
     /// Maximum distance of a vertex' foot from an uncovered position beside it (cells).
@@ -88,11 +83,12 @@ impl Cover<'_> {
         }
         let slack = (SLACK * self.spacing).max(1.0);
         let mut wanted = Marks::default();
-        positions.iter().for_each(|position| around(bin_of(position, slack)).for_each(|bin| wanted.set(bin)));
-        let in_bins = |(chunk, triangles): (usize, &[[u32; 3]])| {
-            ctx.check()?;
+        positions
+            .iter()
+            .for_each(|position| around(bin_of(position, slack)).into_iter().for_each(|bin| wanted.set(bin)));
+        let in_bins = |first: usize, triangles: &[[u32; 3]]| {
             let (mut out, mut bins) = (Vec::new(), Vec::new());
-            for (triangle, index) in triangles.iter().zip((chunk * GRAIN) as u32..) {
+            for (triangle, index) in triangles.iter().zip(first as u32..) {
                 let Some(corners) = self.corners(triangle) else { continue };
                 each_bin(corners, slack, |bin| bins.push(bin));
                 // Parts of a long triangle share most of their bins.
@@ -100,26 +96,15 @@ impl Cover<'_> {
                 bins.dedup();
                 out.extend(bins.drain(..).filter(|bin| wanted.has(*bin)).map(|bin| (bin, index)));
             }
-            Ok(out)
+            out
         };
-        let lists: Vec<Vec<(Coord, u32)>> = self
-            .triangles
-            .par_chunks(GRAIN)
-            .enumerate()
-            .map(|(n, part)| in_bins((n, part)))
-            .collect::<Result<_>>()?;
-        let bins = Bins::new(slack, lists.concat());
+        let bins = Bins::new(slack, in_pieces(ctx, self.triangles, GRAIN, in_bins)?);
         let is_bare = |position: &DVec3| {
             !bins.near(position).any(|triangle| self.distance(triangle, position) <= slack)
         };
-        let parts: Vec<Vec<DVec3>> = positions
-            .par_chunks(GRAIN)
-            .map(|positions| {
-                ctx.check()?;
-                Ok(positions.iter().filter(|position| is_bare(position)).copied().collect())
-            })
-            .collect::<Result<_>>()?;
-        Ok(parts.concat())
+        in_pieces(ctx, positions, GRAIN, |_, positions| {
+            positions.iter().filter(|position| is_bare(position)).copied().collect()
+        })
     }
 
     fn corners(&self, triangle: &[u32; 3]) -> Option<[DVec3; 3]> {
@@ -180,17 +165,12 @@ fn each_bin(triangle: [DVec3; 3], edge: f64, mut see: impl FnMut(Coord)) {
     while let Some([a, b, c]) = next {
         let [low, high] = [bin_of(&a.inf(&b).inf(&c), edge), bin_of(&a.sup(&b).sup(&c), edge)];
         if (0..3).all(|axis| high[axis] - low[axis] <= 1) {
-            each_between(low, high).for_each(&mut see);
+            between(low, high).for_each(&mut see);
             next = due.pop();
             continue;
         }
         // The longest edge, ab, is halved.
-        let lengths = [(a - b).norm_squared(), (b - c).norm_squared(), (c - a).norm_squared()];
-        let [a, b, c] = match lengths {
-            [ab, bc, ca] if ab >= bc && ab >= ca => [a, b, c],
-            [_, bc, ca] if bc >= ca => [b, c, a],
-            _ => [c, a, b],
-        };
+        let [a, b, c] = longest_first([a, b, c]);
         let middle = 0.5 * (a + b);
         due.push([a, middle, c]);
         next = Some([middle, b, c]);
@@ -220,17 +200,6 @@ fn bit(cell: Coord) -> u64 {
 
 fn bin_of(position: &DVec3, edge: f64) -> Coord {
     cell_of(&(position / edge))
-}
-
-/// Bins from one to another, ascending.
-fn each_between(low: Coord, high: Coord) -> impl Iterator<Item = Coord> {
-    let on = move |axis: usize| low[axis]..=high[axis];
-    on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z])))
-}
-
-/// A bin and those around it.
-fn around(bin: Coord) -> impl Iterator<Item = Coord> {
-    each_between(bin.map(|x| x - 1), bin.map(|x| x + 1))
 }
 
 #[cfg(test)]

@@ -5,8 +5,8 @@ use super::particle_count::{Bounds, ParticleCountTest, are_inside, seen_from};
 use crate::geometry::DVec3;
 use crate::geometry::check::topology;
 use crate::geometry::check::topology::bodies;
-use crate::geometry::mesh::{renumbered, used};
-use crate::mesh_repair::Source;
+use crate::geometry::mesh::{compact, drop_marked};
+use crate::geometry::shape::six_volumes;
 
 impl Change {
     /// Removes the parts of the mesh with a volume over 0 that hold too few particles, and the hollows in them. Returns the count of those
@@ -48,13 +48,10 @@ impl Change {
         for triangle in out.iter().map(|part| &parts[*part]).chain(hollows).flatten() {
             is_out[*triangle as usize] = true;
         }
-        let mut marks = is_out.iter();
-        self.triangles.retain(|_| !marks.next().copied().unwrap_or_default());
-        let mut marks = is_out.iter();
-        self.sources.retain(|_: &Source| !marks.next().copied().unwrap_or_default());
-        let names = used(self.vertices.len(), &self.triangles)
-            .unwrap_or_else(|| (0..self.vertices.len() as u32).collect());
-        self.triangles = renumbered(&self.triangles, &names);
+        drop_marked(&mut self.triangles, &is_out);
+        drop_marked(&mut self.sources, &is_out);
+        let (names, triangles) = compact(self.vertices.len(), &self.triangles);
+        self.triangles = triangles;
         self.vertices = names.iter().map(|name| self.vertices[*name as usize]).collect();
         self.origins = names.iter().map(|name| self.origins[*name as usize]).collect();
         gone
@@ -66,7 +63,7 @@ impl Change {
         let (mut low, mut high, mut six) = (first, first, 0.0);
         for [a, b, c] in self.corners(part) {
             (low, high) = (low.inf(&a).inf(&b).inf(&c), high.sup(&a).sup(&b).sup(&c));
-            six += (a - first).dot(&(b - first).cross(&(c - first)));
+            six += six_volumes(&[a, b, c], &first);
         }
         (six > 0.0).then_some([low, high])
     }
@@ -81,8 +78,8 @@ impl Change {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::{Context, Pool};
-    use crate::surface::test_particles::{numbered, own_surface, shell};
+    use crate::geometry::coords::between;
+    use crate::surface::test_particles::{context, numbered, own_surface, shell};
     use crate::surface::{Params, Particles, Tracker};
 
     const FRAMES: i32 = 28;
@@ -90,9 +87,8 @@ mod tests {
     const AWAY: i32 = 23;
 
     /// A box of positions 1 m apart.
-    fn lattice(low: DVec3, counts: [u32; 3]) -> impl Iterator<Item = DVec3> {
-        let on = move |axis: usize| (0..counts[axis]).map(f64::from);
-        on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| low + DVec3::new(x, y, z))))
+    fn lattice(low: DVec3, counts: [i32; 3]) -> impl Iterator<Item = DVec3> {
+        between([0; 3], counts.map(|count| count - 1)).map(move |at| low + DVec3::from(at.map(f64::from)))
     }
 
     /// A ball, from which a drop of 4 particles flies one way and a drop of 20 the other, and the centres of these drops.
@@ -109,7 +105,7 @@ mod tests {
 
     /// Follows it to the end: the count of specks removed, and the counts of vertices at both drops in each of the last frames.
     fn followed(min_drop: usize) -> (usize, Vec<[usize; 2]>) {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let mut from = splash(0).0;
         let mesh = own_surface(&ctx, &from.positions);
         let params = Params { rebuild: true, min_drop, ..Params::for_spacing(1.0) };
@@ -142,7 +138,7 @@ mod tests {
     #[test]
     fn a_hollow_goes_with_the_drop_around_it() {
         const LEAST: usize = 1200;
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let ball = shell(DVec3::zeros(), 0.0, 7.0);
         let hollow = shell(DVec3::new(-20.0, 0.3, 0.2), 4.0, 6.5);
         assert!(hollow.len() < LEAST && ball.len() >= LEAST, "{} and {}", hollow.len(), ball.len());

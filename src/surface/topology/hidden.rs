@@ -16,20 +16,21 @@ use std::collections::{BTreeMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::mesh_distance::{between, far, node};
+use super::mesh_distance::{far, node};
 use super::particle_count::{Bounds, is_within};
 use crate::context::Context;
 use crate::distance::lattice::Lattice;
 use crate::error::Result;
-use crate::geometry::Coord;
-use crate::geometry::DVec3;
 use crate::geometry::check::topology::{bodies, parts};
+use crate::geometry::coords::{around, between, cell_of, cells_at, is_between, nodes_of, plus};
+use crate::geometry::shape::{longest_first, six_volumes};
+use crate::geometry::{Coord, DVec3};
 use crate::mesh_repair::{CellSet, Shape};
 use crate::numeric::blocks::{VOXELS, offset};
 use crate::surface::level_set::band::Distances;
 use crate::surface::level_set::implicit::Implicit;
 use crate::surface::level_set::sampler::Sampler;
-use crate::surface::particles::grid::cell_of;
+use crate::surface::pieces::in_pieces;
 
 /// How much farther from phi = 0 than its detail the mesh must be to be flagged (spacings; a cell at least).
 const SLACK: f64 = 0.5;
@@ -75,7 +76,7 @@ impl Everywhere<'_> {
         for node in mesh.differing(ctx)? {
             let position = DVec3::from(plus(node, origin).map(f64::from));
             if !self.specks.iter().any(|speck| is_within(speck, &position)) {
-                cells_at(node).for_each(|cell| _ = set.add(cell));
+                cells_at(node).into_iter().for_each(|cell| _ = set.add(cell));
             }
         }
         mesh.stray(ctx)?.into_iter().for_each(|cell| _ = set.add(cell));
@@ -110,7 +111,7 @@ struct Large {
 impl Large {
     /// Whether a block is within `by` blocks of it.
     fn is_near(&self, block: Coord, by: i32) -> bool {
-        (0..3).all(|axis| (self.low[axis] - by..=self.high[axis] + by).contains(&block[axis]))
+        is_between(block, self.low.map(|at| at - by), self.high.map(|at| at + by))
     }
 }
 
@@ -127,23 +128,15 @@ impl Compared<'_> {
     fn differing(&self, ctx: &Context) -> Result<Vec<Coord>> {
         let passed = self.passed(ctx)?;
         let origin = self.origin.map(|at| at >> 3);
-        let known = self.distances.coords().iter().map(|block| [0, 1, 2].map(|at| block[at] - origin[at]));
+        let known = self.distances.coords().iter().map(|block| plus(*block, origin.map(|at| -at)));
         let mut blocks: Vec<Coord> = known.chain(passed.keeps.keys().copied()).collect();
         blocks.sort_unstable();
         blocks.dedup();
-        let lists: Vec<Vec<Coord>> = blocks
-            .par_iter()
-            .map(|block| {
-                ctx.check()?;
-                Ok(self.differing_in(*block, &passed))
-            })
-            .collect::<Result<_>>()?;
-        Ok(lists.concat())
+        in_pieces(ctx, &blocks, 1, |_, blocks| self.differing_in(blocks[0], &passed))
     }
 
     fn differing_in(&self, block: Coord, passed: &Passed) -> Vec<Coord> {
-        let around = between(block.map(|at| at - 1), block.map(|at| at + 1));
-        let near = around.filter_map(|block| passed.keeps.get(&block).copied());
+        let near = around(block).into_iter().filter_map(|block| passed.keeps.get(&block).copied());
         let large = passed.large.iter().filter(|large| large.is_near(block, 1)).map(|large| large.keeps);
         let allowed = self.slack + near.chain(large).fold(0.0, f32::max);
         let there = plus(block, self.origin.map(|at| at >> 3));
@@ -238,7 +231,7 @@ impl Compared<'_> {
             ctx.check()?;
             let corners = || part.iter().map(move |triangle| self.corners(&triangles[*triangle as usize]));
             let Some([first, ..]) = corners().next() else { continue };
-            let six = corners().map(|[a, b, c]| (a - first).dot(&(b - first).cross(&(c - first))));
+            let six = corners().map(|corners| six_volumes(&corners, &first));
             let is_hollow = six.sum::<f64>() < 0.0;
             if is_hollow
                 && corners().flatten().all(|position| self.phi_at(&mut sampler, position) < -self.slack)
@@ -259,15 +252,15 @@ impl Compared<'_> {
         let mut due: Vec<Coord> = Vec::new();
         for cell in surface {
             set.add(cell);
-            due.extend((0..8).map(|n| plus(cell, corner(n))));
+            due.extend(nodes_of(cell));
         }
         let mut seen: HashSet<Coord> = HashSet::new();
         while let Some(node) = due.pop() {
-            let is_there = (0..3).all(|axis| (low[axis]..=high[axis] + 1).contains(&node[axis]));
+            let is_there = is_between(node, low, high.map(|at| at + 1));
             if !is_there || !seen.insert(node) || self.is_inside(node) || self.phi_of(node) >= -self.slack {
                 continue;
             }
-            cells_at(node).for_each(|cell| _ = set.add(cell));
+            cells_at(node).into_iter().for_each(|cell| _ = set.add(cell));
             for axis in 0..3 {
                 for by in [-1, 1] {
                     let mut beside = node;
@@ -318,29 +311,6 @@ fn raise(all: &mut BTreeMap<Coord, f32>, block: Coord, keeps: f32) {
     *most = most.max(keeps);
 }
 
-fn plus(a: Coord, b: Coord) -> Coord {
-    [0, 1, 2].map(|axis| a[axis] + b[axis])
-}
-
-/// A corner of a cell, relative to its first node.
-fn corner(n: i32) -> Coord {
-    [n >> 2, n >> 1 & 1, n & 1]
-}
-
-/// The eight cells around a node.
-fn cells_at(node: Coord) -> impl Iterator<Item = Coord> {
-    (0..8).map(move |n| plus(node, corner(n).map(|at| -at)))
-}
-
-/// The corners of a triangle, rotated so that its longest edge is the first.
-fn longest_first([a, b, c]: [DVec3; 3]) -> [DVec3; 3] {
-    match [(a - b).norm_squared(), (b - c).norm_squared(), (c - a).norm_squared()] {
-        [ab, bc, ca] if ab >= bc && ab >= ca => [a, b, c],
-        [_, bc, ca] if bc >= ca => [b, c, a],
-        _ => [c, a, b],
-    }
-}
-
 /// Calls `see` with positions on a triangle whose first edge is its longest, at most a cell apart.
 fn each_position([a, b, c]: [DVec3; 3], mut see: impl FnMut(DVec3)) {
     let length = (b - a).norm();
@@ -360,15 +330,10 @@ fn each_position([a, b, c]: [DVec3; 3], mut see: impl FnMut(DVec3)) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
     use crate::geometry::check::faults::Faults;
     use crate::geometry::{TriMesh, Vec3};
-    use crate::surface::test_particles::{numbered, own_surface, shell, two_balls};
+    use crate::surface::test_particles::{context, numbered, own_surface, shell, two_balls};
     use crate::surface::{Params, Tracker};
-
-    fn context() -> Context {
-        Context::new(Pool::new(2).unwrap())
-    }
 
     /// A mesh tracked along particles that stay where they are.
     fn followed(ctx: &Context, mesh: &TriMesh, positions: &[DVec3], every: bool) -> Tracker {
@@ -391,7 +356,7 @@ mod tests {
 
     #[test]
     fn a_hollow_with_liquid_in_it_is_filled() {
-        let ctx = context();
+        let ctx = context(2);
         let positions = shell(DVec3::zeros(), 0.0, 6.5);
         let mut mesh = own_surface(&ctx, &positions);
         let hollow = own_surface(&ctx, &shell(DVec3::new(2.5, 0.3, 0.2), 0.0, 2.0));
@@ -405,7 +370,7 @@ mod tests {
 
     #[test]
     fn a_bubble_of_the_liquid_is_meshed() {
-        let ctx = context();
+        let ctx = context(2);
         let places = shell(DVec3::zeros(), 5.0, 8.5);
         let whole = own_surface(&ctx, &places);
         let of_part = |part: Vec<u32>| {
@@ -424,7 +389,7 @@ mod tests {
 
     #[test]
     fn a_needle_across_a_gap_is_cut() {
-        let ctx = context();
+        let ctx = context(2);
         let positions = two_balls(3.5, DVec3::new(-7.0, 0.0, 0.0)).positions;
         let mut mesh = own_surface(&ctx, &positions);
         // The tip of a triangle that faces the other ball is pulled up to it.
@@ -454,7 +419,7 @@ mod tests {
 
     #[test]
     fn detail_stays_as_it_is() {
-        let ctx = context();
+        let ctx = context(2);
         let positions = shell(DVec3::zeros(), 0.0, 6.5);
         let mut mesh = own_surface(&ctx, &positions);
         // A bump of 2 m on one side, a dent of 1.5 m on the other.

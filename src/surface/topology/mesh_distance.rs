@@ -11,8 +11,8 @@ use crate::distance::lattice::Lattice;
 use crate::distance::nearest::{Search, search as find};
 use crate::distance::triangle::Triangle;
 use crate::error::Result;
-use crate::geometry::Coord;
-use crate::geometry::DVec3;
+use crate::geometry::coords::{between, cells_at, is_between, plus};
+use crate::geometry::{Coord, DVec3};
 use crate::mesh_repair::{CellSet, GridEdge, Inside, Shape, end};
 use crate::numeric::blocks::{DIM, VOXELS, Values, offset};
 use crate::numeric::lanes::LANES;
@@ -89,7 +89,7 @@ impl<'a> Gamma<'a> {
         let mut nodes = Vec::new();
         let mut positions = Vec::new();
         for (slot, block) in blocks.iter().enumerate() {
-            let there = [0, 1, 2].map(|axis| block[axis] + origin[axis]);
+            let there = plus(*block, origin);
             let known = distances.find(there).map(|slot| distances.values(slot));
             if known.is_none() && near[slot].is_empty() {
                 continue;
@@ -99,7 +99,8 @@ impl<'a> Gamma<'a> {
                 let phi = known.map_or_else(|| far(phi, distances.reach(), there, at), |values| values[at]);
                 let size = own[slot][at].clamp(LEAST, KNOWN);
                 let gamma = if shape.pierces.winding(position) > 0 { -size } else { size };
-                nodes.push(Node { position, gamma, phi, is_flagged: is_flagged(flagged, position) });
+                let is_flagged = cells_at(position).into_iter().any(|cell| flagged.holds(cell));
+                nodes.push(Node { position, gamma, phi, is_flagged });
                 positions.push((slot, at));
             }
         }
@@ -159,11 +160,6 @@ pub(in crate::surface) fn node(block: Coord, at: usize) -> Coord {
     [block[0] * 8 + (at >> 6) as i32, block[1] * 8 + (at >> 3 & 7) as i32, block[2] * 8 + (at & 7) as i32]
 }
 
-/// Whether a node is a corner of a flagged cell.
-fn is_flagged(flagged: &CellSet, node: Coord) -> bool {
-    (0..8).any(|n| flagged.holds([node[0] - (n >> 2), node[1] - (n >> 1 & 1), node[2] - (n & 1)]))
-}
-
 /// phi at a node of a block (of phi's grid) in which no distances are known: the reach, with the sign of phi.
 pub(in crate::surface) fn far(phi: &Implicit, reach: f32, block: Coord, at: usize) -> f32 {
     let node = node(block, at);
@@ -176,12 +172,6 @@ pub(in crate::surface) fn far(phi: &Implicit, reach: f32, block: Coord, at: usiz
         None => phi.is_inside(patch),
     };
     if is_inside { -reach } else { reach }
-}
-
-/// Blocks, or other coordinates, in a box, including its ends.
-pub(in crate::surface) fn between(low: Coord, high: Coord) -> impl Iterator<Item = Coord> {
-    let on = move |axis: usize| low[axis]..=high[axis];
-    on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z])))
 }
 
 /// The triangles near each block, in cells from its first node.
@@ -202,8 +192,7 @@ fn near(
         let size = (0..3).map(|axis| i64::from(high[axis] - low[axis]) + 1).product::<i64>();
         if size > blocks.len() as i64 {
             // A spike: its box contains more blocks than there are.
-            let is_in = |block: &Coord| (0..3).all(|axis| (low[axis]..=high[axis]).contains(&block[axis]));
-            let within = blocks.iter().zip(&mut lists).filter(|(block, _)| is_in(block));
+            let within = blocks.iter().zip(&mut lists).filter(|(block, _)| is_between(**block, low, high));
             within.for_each(|(_, list)| list.push(triangle));
             continue;
         }

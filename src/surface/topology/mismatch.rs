@@ -7,11 +7,11 @@ use super::hidden::Everywhere;
 use super::uncovered_parts::is_near;
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::coords::cell_of;
 use crate::geometry::{Coord, DVec3};
 use crate::surface::level_set::band::Distances;
 use crate::surface::level_set::implicit::Implicit;
 use crate::surface::params::Params;
-use crate::surface::particles::grid::cell_of;
 use crate::surface::tracked_mesh::Tracker;
 use crate::surface::tracker::{Covered, Next};
 
@@ -93,13 +93,12 @@ impl Tracker {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
-    use crate::surface::test_particles::{numbered, own_surface, shell};
+    use crate::surface::test_particles::{context, numbered, own_surface, shell};
 
     #[test]
     fn a_vertex_that_jumps_alone_has_a_step_to_come_back() {
         let particles = numbered(shell(DVec3::zeros(), 0.0, 3.2));
-        let ctx = Context::new(Pool::new(1).unwrap());
+        let ctx = context(1);
         let mesh = own_surface(&ctx, &particles.positions);
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(&ctx, params, &mesh, &particles).unwrap();

@@ -3,12 +3,10 @@
 //! The particles' surface passes close to the particles of small drops, and some of them lie outside it: of 20 at random positions 10 to 14
 //! lie inside, nearly all others less than half a spacing from it. So those beside a part count too, if any lies inside.
 
-use super::mesh_distance::between;
-use crate::geometry::Coord;
 use crate::geometry::check::deviation::NearestTree;
+use crate::geometry::coords::{between, cell_of};
 use crate::geometry::spatial::bvh::Bvh;
-use crate::geometry::{DVec3, TriMesh};
-use crate::surface::particles::grid::cell_of;
+use crate::geometry::{Coord, DVec3, TriMesh};
 
 /// A direction along which no edges of modelled meshes run.
 const ASLANT: DVec3 = DVec3::new(0.5773, 0.6533, 0.4896);

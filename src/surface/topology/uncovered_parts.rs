@@ -3,11 +3,12 @@
 use rayon::prelude::*;
 
 use super::particle_count::{Bounds, ParticleCountTest, are_inside, seen_from};
-use crate::geometry::Coord;
-use crate::geometry::DVec3;
+use crate::geometry::check::topology::Sets;
+use crate::geometry::coords::cell_of;
+use crate::geometry::shape::{bounds, six_volumes};
+use crate::geometry::{Coord, DVec3};
 use crate::surface::level_set::implicit::Implicit;
 use crate::surface::level_set::isosurface::Isosurface;
-use crate::surface::particles::grid::cell_of;
 
 /// A part of the particles' surface on which no vertex of the mesh lies.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +39,15 @@ pub struct MissingParts {
     pub specks: Vec<Bounds>,
 }
 
+/// Of a part: its triangles, their first corner (cells), the sum of their corners, and six times the volume.
+#[derive(Clone, Default)]
+struct Sum {
+    triangles: usize,
+    first: DVec3,
+    corners: DVec3,
+    six: f64,
+}
+
 /// The connected parts of the particles' surface, and which of them the mesh covers.
 pub struct Parts {
     /// The part of each vertex.
@@ -51,8 +61,12 @@ impl Parts {
     pub fn new(phi: &Implicit, surface: &Isosurface, mut feet: Vec<Coord>) -> Self {
         feet.par_sort_unstable();
         feet.dedup();
-        let of_vertex = connected(surface);
-        let count = of_vertex.iter().map(|part| *part as usize + 1).max().unwrap_or(0);
+        let mut sets = Sets::new(surface.vertices());
+        for &[a, b, c] in surface.runs().flat_map(|(_, triangles)| triangles) {
+            sets.join(a, b);
+            sets.join(a, c);
+        }
+        let (of_vertex, count) = sets.numbered();
         let mut is_covered = vec![false; count];
         for (vertex, part) in (0..).zip(&of_vertex) {
             let part = *part as usize;
@@ -73,28 +87,15 @@ impl Parts {
         if self.is_covered.iter().all(|covered| *covered) {
             return MissingParts::default();
         }
-        let mut six = vec![0.0f64; self.is_covered.len()];
-        let mut firsts: Vec<Option<DVec3>> = vec![None; six.len()];
-        for triangle in surface.runs().flat_map(|(_, triangles)| triangles) {
-            let part = self.of_vertex[triangle[0] as usize] as usize;
-            if !self.is_covered[part] {
-                let [a, b, c] = triangle.map(|vertex| surface.in_cells(phi, vertex));
-                let origin = *firsts[part].get_or_insert(a);
-                six[part] += (a - origin).dot(&(b - origin).cross(&(c - origin)));
-            }
-        }
-        let mut is_wanted: Vec<bool> = self
-            .is_covered
-            .iter()
-            .zip(&six)
-            .map(|(covered, six)| !covered && (*six > 0.0 || -six / 6.0 >= wanted.bubble))
-            .collect();
+        let sums = self.sums(phi, surface);
+        let is_in = |sum: &Sum| sum.triangles > 0 && (sum.six > 0.0 || -sum.six / 6.0 >= wanted.bubble);
+        let mut is_wanted: Vec<bool> = sums.iter().map(is_in).collect();
         let mut specks = Vec::new();
         if wanted.crowd.least > 1 {
             let (drops, bubbles): (Vec<usize>, Vec<usize>) =
-                (0..six.len()).filter(|part| is_wanted[*part]).partition(|part| six[*part] > 0.0);
-            let first = |part: usize| firsts[part].map(|position| (part, position * phi.cell()));
-            let bubbles: Vec<(usize, DVec3)> = bubbles.into_iter().filter_map(first).collect();
+                (0..sums.len()).filter(|part| is_wanted[*part]).partition(|part| sums[*part].six > 0.0);
+            let bubbles: Vec<(usize, DVec3)> =
+                bubbles.into_iter().map(|part| (part, sums[part].first * phi.cell())).collect();
             let (unwanted, bounds) = self.specks(phi, surface, (&drops, &bubbles), &wanted.crowd);
             unwanted.into_iter().for_each(|part| is_wanted[part] = false);
             specks = bounds;
@@ -120,16 +121,8 @@ impl Parts {
                 triangles[slot].push(triangle.map(|vertex| surface.in_cells(phi, vertex) * phi.cell()));
             }
         }
-        let bounds: Vec<Bounds> = triangles
-            .iter()
-            .map(|triangles| {
-                let corners = triangles.as_flattened();
-                let first = corners.first().copied().unwrap_or_default();
-                corners
-                    .iter()
-                    .fold([first; 2], |[low, high], position| [low.inf(position), high.sup(position)])
-            })
-            .collect();
+        let bounds: Vec<Bounds> =
+            triangles.iter().map(|triangles| bounds(triangles.as_flattened()).into()).collect();
         let mesh = |slot: usize| seen_from(bounds[slot][0], &triangles[slot]);
         let counts = crowd.held(&bounds, mesh);
         let few: Vec<usize> = (0..drops.len()).filter(|slot| counts[*slot] < crowd.least).collect();
@@ -142,34 +135,38 @@ impl Parts {
         (parts, few_bounds.into_iter().map(in_cells).collect())
     }
 
-    /// The parts that the mesh does not cover, the largest first.
-    pub fn apart(&self, phi: &Implicit, surface: &Isosurface) -> Vec<UncoveredPart> {
-        if self.is_covered.iter().all(|covered| *covered) {
-            return Vec::new();
-        }
-        // Sums of corners and their count, six times the volume relative to the first corner, triangles.
-        let mut sums = vec![(DVec3::zeros(), 0usize, 0.0f64, 0usize); self.is_covered.len()];
-        let mut firsts: Vec<Option<DVec3>> = vec![None; sums.len()];
+    /// The sums of each part; without triangles where the mesh covers it.
+    fn sums(&self, phi: &Implicit, surface: &Isosurface) -> Vec<Sum> {
+        let mut sums = vec![Sum::default(); self.is_covered.len()];
         for triangle in surface.runs().flat_map(|(_, triangles)| triangles) {
             let part = self.of_vertex[triangle[0] as usize] as usize;
             if self.is_covered[part] {
                 continue;
             }
             let [a, b, c] = triangle.map(|vertex| surface.in_cells(phi, vertex));
-            let origin = *firsts[part].get_or_insert(a);
             let sum = &mut sums[part];
-            sum.0 += a + b + c;
-            sum.1 += 3;
-            sum.2 += (a - origin).dot(&(b - origin).cross(&(c - origin)));
-            sum.3 += 1;
+            if sum.triangles == 0 {
+                sum.first = a;
+            }
+            sum.corners += a + b + c;
+            sum.six += six_volumes(&[a, b, c], &sum.first);
+            sum.triangles += 1;
+        }
+        sums
+    }
+
+    /// The parts that the mesh does not cover, the largest first.
+    pub fn apart(&self, phi: &Implicit, surface: &Isosurface) -> Vec<UncoveredPart> {
+        if self.is_covered.iter().all(|covered| *covered) {
+            return Vec::new();
         }
         let cell = phi.cell();
-        let told =
-            sums.into_iter().filter(|sum| sum.3 > 0).map(|(corners, count, six, triangles)| UncoveredPart {
-                position: corners / count as f64 * cell,
-                volume: six / 6.0 * cell.powi(3),
-                triangles,
-            });
+        let sums = self.sums(phi, surface).into_iter().filter(|sum| sum.triangles > 0);
+        let told = sums.map(|Sum { corners, six, triangles, .. }| UncoveredPart {
+            position: corners / (3 * triangles) as f64 * cell,
+            volume: six / 6.0 * cell.powi(3),
+            triangles,
+        });
         let mut out: Vec<UncoveredPart> = told.collect();
         out.sort_by(|a, b| b.volume.abs().total_cmp(&a.volume.abs()));
         out
@@ -186,34 +183,4 @@ pub fn is_near(feet: &[Coord], cell: Coord) -> bool {
             feet.get(at).is_some_and(|foot| foot[..2] == low[..2] && foot[2] <= cell[2] + 1)
         })
     })
-}
-
-/// The part of each vertex, numbered in the order of the parts' first vertices.
-fn connected(surface: &Isosurface) -> Vec<u32> {
-    let mut parent: Vec<u32> = (0..surface.vertices() as u32).collect();
-    fn root(parent: &mut [u32], mut at: u32) -> u32 {
-        while parent[at as usize] != at {
-            parent[at as usize] = parent[parent[at as usize] as usize];
-            at = parent[at as usize];
-        }
-        at
-    }
-    for [a, b, c] in surface.runs().flat_map(|(_, triangles)| triangles) {
-        for other in [b, c] {
-            let [from, to] = [a, other].map(|vertex| root(&mut parent, *vertex));
-            // The lower one is the root: it comes first.
-            parent[from.max(to) as usize] = from.min(to);
-        }
-    }
-    let mut numbers = vec![u32::MAX; parent.len()];
-    let mut count = 0;
-    for vertex in 0..parent.len() as u32 {
-        let root = root(&mut parent, vertex) as usize;
-        if numbers[root] == u32::MAX {
-            numbers[root] = count;
-            count += 1;
-        }
-        numbers[vertex as usize] = numbers[root];
-    }
-    numbers
 }

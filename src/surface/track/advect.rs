@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::coords::nodes_of;
 use crate::geometry::{Coord, DVec3};
 use crate::surface::Particles;
 use crate::surface::params::{Params, Weighting};
@@ -122,7 +123,7 @@ impl Field<'_> {
     fn carry_by_maps(&self, ctx: &Context, vertices: &mut [DVec3], order: &mut [(Coord, u32)]) -> Result<()> {
         sort(vertices, self.spacing, order);
         let groups: Vec<&[(Coord, u32)]> = order.chunk_by(|a, b| a.0 == b.0).collect();
-        let mut nodes: Vec<Coord> = groups.iter().flat_map(|group| corners(group[0].0)).collect();
+        let mut nodes: Vec<Coord> = groups.iter().flat_map(|group| nodes_of(group[0].0)).collect();
         nodes.par_sort_unstable_by_key(|node| (node.map(|x| x >> 1), *node));
         nodes.dedup();
         // Nodes in the same particle cell share the particles around them.
@@ -143,7 +144,7 @@ impl Field<'_> {
         };
         let follow = |group: &[(Coord, u32)]| {
             let cell = group[0].0;
-            let around = corners(cell).each_ref().map(find);
+            let around = nodes_of(cell).each_ref().map(find);
             let way = |(_, vertex): &(Coord, u32)| {
                 let at = vertices[*vertex as usize] / self.spacing - DVec3::from(cell.map(f64::from));
                 blended(&around, at).unwrap_or_else(|| self.mean_far(vertices[*vertex as usize]))
@@ -240,11 +241,6 @@ fn add(groups: &[&[(Coord, u32)]], ways: &[Vec<DVec3>], vertices: &mut [DVec3]) 
     }
 }
 
-/// The eight nodes of a cell: bits x, y and z of their index.
-fn corners(cell: Coord) -> [Coord; 8] {
-    std::array::from_fn(|n| [0, 1, 2].map(|axis| cell[axis] + (n >> (2 - axis) & 1) as i32))
-}
-
 /// Blends the maps at the corners of a cell at a position in it (0..1 on each axis): weights grow with proximity and with the particle
 /// weight behind a map. None without maps.
 fn blended(maps: &[Option<Map>; 8], at: DVec3) -> Option<DVec3> {
@@ -271,11 +267,11 @@ pub(in crate::surface) fn validate_step(from: &Particles, to: &Particles, dt: f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
+    use crate::surface::test_particles::context;
 
     #[test]
     fn positions_outside_of_the_particles_turn_with_them_and_lag_behind_by_the_mean() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let grid = (0..729).map(|n| [n / 81, n / 9 % 9, n % 9].map(|x| f64::from(x) - 4.0));
         let positions: Vec<DVec3> = grid.map(DVec3::from).collect();
         let turn = |position: &DVec3| position + DVec3::new(-position.z, 0.0, position.x) * 0.05;

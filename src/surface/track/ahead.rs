@@ -14,9 +14,9 @@ type Surface = Arc<(Implicit, Isosurface)>;
 #[derive(Debug, Clone, Default)]
 pub(in crate::surface) struct Ahead {
     /// Particles whose surface is to be computed during the next step.
-    pub(super) wanted: Option<Arc<Particles>>,
+    pub(in crate::surface) wanted: Option<Arc<Particles>>,
     /// Particles whose surface is ready, and that surface.
-    pub(super) ready: Option<(Arc<Particles>, Surface)>,
+    pub(in crate::surface) ready: Option<(Arc<Particles>, Surface)>,
 }
 
 impl Ahead {

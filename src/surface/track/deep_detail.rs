@@ -3,10 +3,10 @@
 
 use std::collections::BTreeMap;
 
+use crate::geometry::coords::{between, cell_of};
 use crate::geometry::{Coord, DVec3};
 use crate::numeric::blocks::DIM;
 use crate::surface::level_set::band::reach_in;
-use crate::surface::particles::grid::cell_of;
 use crate::surface::tracked_mesh::{DRIFT, REACH, Tracker, WIDER};
 
 /// Blocks of the band, ascending, and its reach in each (cells).
@@ -44,9 +44,7 @@ impl Tracker {
             }
         }
         let blocks = |([low, high], reach): ([Coord; 2], f64)| {
-            let on = move |axis: usize| low[axis]..=high[axis];
-            let all = on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z])));
-            all.map(move |block| (block, reach as f32))
+            between(low, high).map(move |block| (block, reach as f32))
         };
         sorted(boxes.into_iter().flat_map(blocks).collect())
     }
@@ -67,13 +65,12 @@ pub fn covers(deep: &[(Coord, f32)], other: &[(Coord, f32)]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::{Context, Pool};
-    use crate::surface::test_particles::{numbered, own_surface, shell};
+    use crate::surface::test_particles::{context, numbered, own_surface, shell};
     use crate::surface::{Params, Particles};
 
     #[test]
     fn one_deep_detail_widens_the_band_around_it_alone_and_is_kept() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let positions = shell(DVec3::zeros(), 0.0, 6.2);
         let mut mesh = own_surface(&ctx, &positions);
         for vertex in [17, 18] {

@@ -8,7 +8,7 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::check::deviation::NearestTree;
 use crate::geometry::check::topology::{around, bodies};
-use crate::geometry::mesh::{renumbered, used};
+use crate::geometry::mesh::compact;
 use crate::geometry::{DVec3, TriMesh, Vec3};
 use crate::mesh_repair::{Source, weights};
 use crate::surface::topology::change::Change;
@@ -201,8 +201,7 @@ impl Patch {
     }
 
     fn of(vertices: usize, triangles: Vec<[u32; 3]>, is_loose: impl Fn(u32) -> bool) -> Self {
-        let names = used(vertices, &triangles).unwrap_or_else(|| (0..vertices as u32).collect());
-        let triangles = renumbered(&triangles, &names);
+        let (names, triangles) = compact(vertices, &triangles);
         Self { is_loose: names.iter().map(|name| is_loose(*name)).collect(), names, triangles }
     }
 
@@ -250,13 +249,12 @@ impl Patch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
-    use crate::surface::test_particles::{own_surface, two_balls};
+    use crate::surface::test_particles::{context, own_surface, two_balls};
     use crate::surface::{Params, Tracker};
 
     #[test]
     fn the_old_surface_leads_to_the_bridge_that_comes() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let balls = |away: f64| two_balls(4.2, DVec3::new(away, 0.1, 0.0));
         let mut from = balls(6.5);
         let mesh = own_surface(&ctx, &from.positions);

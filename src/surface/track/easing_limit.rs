@@ -5,11 +5,10 @@ use std::collections::HashSet;
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::geometry::Coord;
 use crate::geometry::check::faults::meeting_pairs;
-use crate::geometry::mesh::{renumbered, used};
-use crate::geometry::{DVec3, TriMesh};
-use crate::surface::particles::grid::cell_of;
+use crate::geometry::coords::{between, cell_of};
+use crate::geometry::mesh::compact;
+use crate::geometry::{Coord, DVec3, TriMesh};
 
 /// Rounds in which the displacements of intersecting triangles are halved, and the total number of rounds; in the rounds after the halvings
 /// they are set to 0, and after the last round all are.
@@ -92,9 +91,9 @@ impl<'a> Around<'a> {
         let bins = Bins::of(&reached);
         let near: Vec<[u32; 3]> =
             triangles.iter().filter(|corners| bins.has(&bounds(corners))).copied().collect();
-        let names = used(vertices.len(), &near).unwrap_or_else(|| (0..vertices.len() as u32).collect());
+        let (names, triangles) = compact(vertices.len(), &near);
         let slots = names.iter().map(|name| slots[*name as usize]).collect();
-        Self { vertices, displaced, triangles: renumbered(&near, &names), names, slots }
+        Self { vertices, displaced, triangles, names, slots }
     }
 
     /// Pairs of triangles that intersect if vertices are displaced by these shares of the requested displacements.
@@ -154,7 +153,7 @@ impl Bins {
         let mut bins = Self { edge, bounds, touched: HashSet::new(), is_all: false };
         for own in boxes {
             match bins.between(own) {
-                Some([low, high]) => bins.touched.extend(each(low, high)),
+                Some([low, high]) => bins.touched.extend(between(low, high)),
                 None => bins.is_all = true,
             }
         }
@@ -168,7 +167,7 @@ impl Bins {
             return false;
         }
         let Some([low, high]) = self.between(own) else { return true };
-        self.is_all || each(low, high).any(|bin| self.touched.contains(&bin))
+        self.is_all || between(low, high).any(|bin| self.touched.contains(&bin))
     }
 
     /// The range of bins of a box; none if there are too many.
@@ -181,17 +180,10 @@ impl Bins {
     }
 }
 
-/// Bins in a range.
-fn each(low: Coord, high: Coord) -> impl Iterator<Item = Coord> {
-    let on = move |axis: usize| low[axis]..=high[axis];
-    on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z])))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
-    use crate::surface::test_particles::{own_surface, two_balls};
+    use crate::surface::test_particles::{context, own_surface, two_balls};
     use crate::surface::{Outlook, Params, Tracker};
 
     /// Two cubes with a gap of 1 between them.
@@ -211,7 +203,7 @@ mod tests {
 
     #[test]
     fn faces_that_would_pass_through_each_other_stop_short_and_others_do_not() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let (vertices, triangles) = cubes();
         let within = |by: f64| uncrossed(&ctx, &vertices, &triangles, towards(&vertices, by)).unwrap();
         assert_eq!(within(0.49), towards(&vertices, 0.49));
@@ -234,7 +226,7 @@ mod tests {
     #[test]
     fn a_mesh_that_is_shown_before_a_merge_meets_itself_nowhere_that_it_does_not_anyway() {
         const AHEAD: usize = 4;
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let balls = |frame: usize| two_balls(4.2, DVec3::new(6.5 - 0.2 * frame as f64, 0.1, 0.0));
         let mesh = own_surface(&ctx, &balls(0).positions);
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };

@@ -19,21 +19,8 @@ impl Tracker {
     /// Parameters out of range.
     pub fn without_mesh(params: Params) -> Result<Self> {
         params.validate()?;
-        Ok(Self {
-            params,
-            vertices: Vec::new(),
-            triangles: Vec::new(),
-            delta: Vec::new(),
-            detail_retention: Vec::new(),
-            flags: Vec::new(),
-            bare: Vec::new(),
-            reach: crate::surface::tracked_mesh::REACH[0],
-            // Its state includes its own triangles: none.
-            is_rebuilt: true,
-            sizes: Vec::new(),
-            drift: Drift::default(),
-            ahead: Ahead::default(),
-        })
+        // Its state includes its own triangles: none.
+        Ok(Self { is_rebuilt: true, ..Self::of(params, Vec::new(), Vec::new()) })
     }
 
     /// A step to a frame without particles.
@@ -73,11 +60,10 @@ impl Tracker {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
     use crate::geometry::DVec3;
     use crate::geometry::check::faults::Faults;
     use crate::surface::Params;
-    use crate::surface::test_particles::{numbered, own_surface, shell};
+    use crate::surface::test_particles::{context, numbered, own_surface, shell};
 
     const DT: f64 = 0.04;
 
@@ -92,7 +78,7 @@ mod tests {
 
     #[test]
     fn liquid_that_is_gone_and_comes_back_has_no_mesh_and_then_one_again() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let (first, none, second) = (ball(0.0), Particles::default(), ball(20.0));
         let mesh = own_surface(&ctx, &first.positions);
         let mut tracker = Tracker::new(&ctx, params(true), &mesh, &first).unwrap();
@@ -121,7 +107,7 @@ mod tests {
 
     #[test]
     fn a_mesh_that_is_not_rebuilt_waits_where_it_was() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let (first, none) = (ball(0.0), Particles::default());
         let mesh = own_surface(&ctx, &first.positions);
         let mut tracker = Tracker::new(&ctx, params(false), &mesh, &first).unwrap();

@@ -106,9 +106,8 @@ pub fn displaced(eased: &[Eased]) -> Vec<Displaced> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
     use crate::surface::Params;
-    use crate::surface::test_particles::{own_surface, two_balls};
+    use crate::surface::test_particles::{context, own_surface, two_balls};
 
     const DT: f64 = 0.04;
 
@@ -119,7 +118,7 @@ mod tests {
 
     #[test]
     fn steps_that_were_made_ahead_are_those_that_come_and_only_what_goes_is_moved() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let first = balls(0);
         let mesh = own_surface(&ctx, &first.positions);
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };

@@ -8,6 +8,5 @@ pub(in crate::surface) mod easing_limit;
 mod empty;
 pub(in crate::surface) mod fade;
 pub(in crate::surface) mod lookahead;
-pub(in crate::surface) mod prefetch;
 pub(in crate::surface) mod project;
 mod resculpt;

@@ -63,14 +63,14 @@ impl Foot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::{Context, Pool};
     use crate::surface::level_set::band::Distances;
     use crate::surface::level_set::implicit::Implicit;
     use crate::surface::level_set::isosurface::Isosurface;
+    use crate::surface::test_particles::context;
 
     #[test]
     fn feet_are_outward_and_distances_negative_inside() {
-        let ctx = Context::new(Pool::new(1).unwrap());
+        let ctx = context(1);
         let grid = (0..17 * 17 * 17).map(|n| [n / 289, n / 17 % 17, n % 17].map(|x| f64::from(x) - 8.0));
         let positions: Vec<DVec3> = grid.map(DVec3::from).filter(|position| position.norm() < 7.0).collect();
         let phi = Implicit::new(&ctx, &positions, 1.0, 0.5).unwrap();

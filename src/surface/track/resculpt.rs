@@ -38,18 +38,13 @@ impl Tracker {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
     use crate::geometry::{DVec3, Vec3};
     use crate::surface::Params;
-    use crate::surface::test_particles::{numbered, own_surface, shell};
+    use crate::surface::test_particles::{context, numbered, own_surface, shell};
 
     /// Height of the bump (m); particles lie 1 m apart.
     const HEIGHT: f64 = 0.8;
     const DT: f64 = 1.0 / 24.0;
-
-    fn context() -> Context {
-        Context::new(Pool::new(2).unwrap())
-    }
 
     /// The middle of the ball at a frame (m).
     fn middle(frame: i32) -> DVec3 {
@@ -95,7 +90,7 @@ mod tests {
 
     #[test]
     fn a_bump_that_was_sculpted_into_a_later_frame_stays() {
-        let ctx = context();
+        let ctx = context(2);
         for rebuild in [false, true] {
             let (mut tracker, _) = followed(&ctx, rebuild, 5);
             let plain = top(&tracker, 5);
@@ -114,7 +109,7 @@ mod tests {
 
     #[test]
     fn a_state_after_it_goes_on_with_the_same_bytes() {
-        let ctx = context();
+        let ctx = context(2);
         for rebuild in [false, true] {
             let (mut tracker, first) = followed(&ctx, rebuild, 2);
             tracker.set_detail_retention(vec![0.5; tracker.vertices().len()]).unwrap();
@@ -139,7 +134,7 @@ mod tests {
 
     #[test]
     fn a_mesh_that_does_not_fit_leaves_the_tracker_as_it_was() {
-        let ctx = context();
+        let ctx = context(2);
         let (mut tracker, _) = followed(&ctx, true, 1);
         let before = tracker.save();
         let refused = |tracker: &mut Tracker, mesh: &TriMesh, words: &str| {

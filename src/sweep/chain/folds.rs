@@ -14,10 +14,11 @@ use rayon::prelude::*;
 use crate::context::Context;
 use crate::distance::Face;
 use crate::distance::lattice::{Fixed, UNITS};
-use crate::distance::region::{Region, each_block, extent};
+use crate::distance::region::{Region, extent};
 use crate::distance::winding::Lines;
 use crate::error::Result;
 use crate::geometry::DVec3;
+use crate::geometry::coords::{around, between};
 use crate::sweep::moving_mesh::passages::{Change, Passage, Place, Poses, Step, Still, face, to_f64};
 use crate::sweep::moving_mesh::topology::{Simplex, Topology};
 use crate::sweep::window::Window;
@@ -130,7 +131,7 @@ fn touching(topology: &Topology, level: &[Fixed], blocks: &HashSet<[i32; 3]>) ->
     let block = |cells: [f32; 3]| cells.map(|value| (value / 8.0).floor() as i32);
     let touches = |simplex: &Simplex| {
         let (low, high) = extent(&simplex.v.map(|vertex| level[vertex as usize]));
-        each_block(block(low), block(high)).any(|block| blocks.contains(&block))
+        between(block(low), block(high)).any(|block| blocks.contains(&block))
     };
     (0..topology.simplices.len() as u32).filter(|&id| touches(&topology.simplices[id as usize])).collect()
 }
@@ -151,10 +152,6 @@ fn folded_blocks(
     };
     let simplices = topology.simplices.par_iter().with_min_len(GRAIN);
     let faces: Vec<Face> = simplices.map(|simplex| face(simplex, level)).filter(wanted).collect();
-    let around = |block: [i32; 3]| {
-        let [low, high] = [-1, 1].map(|by| block.map(|position| position + by));
-        each_block(low, high)
-    };
     Ok(negative_blocks(&faces, window).into_iter().flat_map(around).collect())
 }
 

@@ -125,7 +125,7 @@ impl BinPrisms {
     /// How winding numbers change from `begin` to `end`, and from there to `beside`, which is at most [`BESIDE`] away.
     pub fn query(&mut self, begin: [f32; 3], end: [f32; 3], beside: [f32; 3]) -> Change {
         self.unclear.clear();
-        let [along, beside] = pass(&self.groups, begin, end, beside, &mut self.unclear);
+        let [along, beside] = pass(&self.groups, [begin, end, beside], &mut self.unclear);
         Change { along, beside }
     }
 
@@ -140,13 +140,7 @@ impl BinPrisms {
 }
 
 /// Sums the changes along the segment and to the point near its end, and lists the undecided prisms.
-fn pass(
-    groups: &[Group],
-    begin: [f32; 3],
-    end: [f32; 3],
-    beside: [f32; 3],
-    unclear: &mut Vec<u32>,
-) -> [i32; 2] {
+fn pass(groups: &[Group], points: [[f32; 3]; 3], unclear: &mut Vec<u32>) -> [i32; 2] {
     #[inline(always)]
     fn value(f: &[[f32; LANES]; 16], function: usize, lane: usize, p: [f32; 3]) -> f32 {
         let k = 4 * function;
@@ -159,13 +153,7 @@ fn pass(
         if c < least { c } else { least }
     }
     #[inline(always)]
-    fn body(
-        groups: &[Group],
-        begin: [f32; 3],
-        end: [f32; 3],
-        beside: [f32; 3],
-        unclear: &mut Vec<u32>,
-    ) -> [i32; 2] {
+    fn body(groups: &[Group], [begin, end, beside]: [[f32; 3]; 3], unclear: &mut Vec<u32>) -> [i32; 2] {
         let [mut along, mut aside] = [[0; LANES]; 2];
         for (at, Group { functions: f, coef }) in groups.iter().enumerate() {
             let mut doubts = [0; LANES];
@@ -197,7 +185,7 @@ fn pass(
         }
         [along, aside].map(|changes| changes.iter().sum())
     }
-    dispatch!(body(groups: &[Group], begin: [f32; 3], end: [f32; 3], beside: [f32; 3], unclear: &mut Vec<u32>) -> [i32; 2])
+    dispatch!(body(groups: &[Group], points: [[f32; 3]; 3], unclear: &mut Vec<u32>) -> [i32; 2])
 }
 
 /// A position or direction in fixed-point units.

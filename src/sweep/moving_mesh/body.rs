@@ -15,6 +15,7 @@ use crate::geometry::DVec3;
 use crate::geometry::check::orientation::{Closing, Orientation};
 use crate::geometry::mesh::weld::{Boundary, STEPS, Weld};
 use crate::geometry::mesh::{coincident, spacing};
+use crate::geometry::shape::bounds;
 use crate::motion::Motion;
 use crate::sweep::chain::{Weights, boundary};
 use crate::sweep::window::Window;
@@ -389,8 +390,7 @@ impl Near {
     }
 
     fn touches(&self, path: impl Iterator<Item = DVec3>, margin: f64) -> bool {
-        let (mut low, mut high) = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
-        path.for_each(|p| (low, high) = (low.inf(&p), high.sup(&p)));
+        let (low, high) = bounds(path);
         (0..3).all(|a| high[a] + margin >= self.low[a] && low[a] - margin <= self.high[a])
     }
 

@@ -3,9 +3,10 @@
 use super::topology::{Simplex, Topology};
 use crate::distance::Face;
 use crate::distance::lattice::{Fixed, UNITS};
-use crate::distance::lists::Lists;
-use crate::distance::region::each_block;
 use crate::geometry::DVec3;
+use crate::geometry::coords::between;
+use crate::geometry::lists::Lists;
+use crate::geometry::shape::bounds;
 use crate::sweep::chain::STILL;
 
 /// Minimum edge (fixed-point units) of the boxes that tetrahedra and faces are sorted into.
@@ -104,7 +105,7 @@ impl Still {
         };
         let corners = |simplex| face(simplex, &poses.levels[level]).v.map(to_f64);
         let faces: Vec<[DVec3; 3]> = poses.topology.simplices.iter().map(corners).filter(is_near).collect();
-        let extents: Vec<_> = faces.iter().map(|corners| bounds(&corners.map(flat))).collect();
+        let extents: Vec<_> = faces.iter().map(|corners| bounds(corners.map(flat))).collect();
         let columns = Boxes::new(points.iter().map(|p| flat(*p)), &extents);
         Self { faces, columns }
     }
@@ -134,7 +135,7 @@ impl Step {
         };
         let near = (0..poses.topology.simplices.len() as u32).filter(is_near);
         let passages: Vec<Passage> = near.flat_map(|triangle| poses.passages(step, triangle)).collect();
-        let extents: Vec<_> = passages.iter().map(|passage| bounds(&passage.corners)).collect();
+        let extents: Vec<_> = passages.iter().map(|passage| bounds(passage.corners)).collect();
         let boxes = Boxes::new(points.iter().copied(), &extents);
         Self { before: Still::new(poses, step, points), passages, boxes }
     }
@@ -190,8 +191,7 @@ struct Boxes {
 impl Boxes {
     /// Boxes about as large as the items with these bounds.
     fn new(points: impl Iterator<Item = DVec3> + Clone, items: &[(DVec3, DVec3)]) -> Self {
-        let start = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
-        let (low, high) = points.clone().fold(start, |(low, high), p| (low.inf(&p), high.sup(&p)));
+        let (low, high) = bounds(points.clone());
         let count = items.len().max(1);
         let sum: DVec3 = items.iter().map(|(low, high)| high - low).sum();
         let mut edge = (sum / count as f64).map(|mean| mean.max(BOX));
@@ -209,14 +209,14 @@ impl Boxes {
                 continue;
             }
             let [first, last] = [from, to].map(|p| out.position(p).map(|position| position as i32));
-            for at in each_block(first, last) {
+            for at in between(first, last) {
                 let number = out.number(at.map(|position| position as usize));
                 if used[number] {
                     pairs.push((number as u32, id));
                 }
             }
         }
-        out.items = Lists::new(used.len(), &[pairs]);
+        out.items = Lists::new(used.len(), pairs.iter().copied());
         out
     }
 
@@ -294,8 +294,4 @@ fn above(p: &DVec3, a: &DVec3, b: &DVec3, c: &DVec3) -> i32 {
 /// A fixed-point position as `f64`.
 pub fn to_f64(p: Fixed) -> DVec3 {
     DVec3::from(p.map(f64::from))
-}
-
-fn bounds(points: &[DVec3]) -> (DVec3, DVec3) {
-    points.iter().fold((points[0], points[0]), |(low, high), p| (low.inf(p), high.sup(p)))
 }

@@ -3,9 +3,11 @@
 //! The boundary of any set of oriented triangles is a set of cycles. Each cycle is closed by a cone to the (moving) centroid of its
 //! vertices, so that open meshes, non-manifold meshes and triangle soups all become closed chains.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 use crate::geometry::DVec3;
+use crate::geometry::check::topology::Sets;
+use crate::geometry::lists::Lists;
 
 /// A triangle with its vertices in ascending order: this order determines how prisms are split.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,7 +49,7 @@ impl Simplex {
 }
 
 /// One triangle beside an edge.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Incidence {
     /// Index of the triangle.
     pub triangle: u32,
@@ -170,31 +172,21 @@ impl Topology {
     }
 
     fn index_edges(&mut self) {
-        const SIDES: [(usize, usize); 3] = [(0, 1), (1, 2), (0, 2)];
-        // Counting sort by the lower vertex, then a short sort by the other: vertices have few neighbours.
-        let mut start = vec![0u32; self.vertex_count() + 1];
-        for simplex in &self.simplices {
-            SIDES.into_iter().for_each(|(i, _)| start[simplex.v[i] as usize + 1] += 1);
-        }
-        (1..start.len()).for_each(|vertex| start[vertex] += start[vertex - 1]);
-        let mut next = start.clone();
-        let mut sorted = vec![(0, Incidence { triangle: 0, side: 0 }); self.simplices.len() * 3];
-        for (triangle, simplex) in self.simplices.iter().enumerate() {
-            for (side, (i, j)) in SIDES.into_iter().enumerate() {
-                let position = &mut next[simplex.v[i] as usize];
-                let at = Incidence { triangle: triangle as u32, side: side as u8 };
-                sorted[*position as usize] = (simplex.v[j], at);
-                *position += 1;
-            }
-        }
+        const SIDES: [(usize, usize, u8); 3] = [(0, 1, 0), (1, 2, 1), (0, 2, 2)];
+        // By the lower vertex, then a short sort by the other: vertices have few neighbours.
+        let of_triangle = |(simplex, triangle): (&Simplex, u32)| {
+            let v = simplex.v;
+            SIDES.map(|(i, j, side)| (v[i], (v[j], Incidence { triangle, side })))
+        };
+        let mut sorted =
+            Lists::new(self.vertex_count(), self.simplices.iter().zip(0..).flat_map(of_triangle));
+        sorted.each_mut(|beside| beside.sort_unstable_by_key(|(other, at)| (*other, at.triangle)));
         self.edges.clear();
         self.edge_start.clear();
         self.incidences.clear();
         for vertex in 0..self.vertex_count() {
-            let beside = &mut sorted[start[vertex] as usize..start[vertex + 1] as usize];
-            beside.sort_unstable_by_key(|(other, at)| (*other, at.triangle));
             let mut last = None;
-            for &(other, at) in beside.iter() {
+            for &(other, at) in sorted.get(vertex) {
                 if last != Some(other) {
                     self.edges.push([vertex as u32, other]);
                     self.edge_start.push(self.incidences.len() as u32);
@@ -221,13 +213,11 @@ impl Topology {
             .map(|edge| (self.edges[edge], self.imbalance(edge)))
             .filter(|(_, imbalance)| *imbalance != 0)
             .collect();
-        let mut group = Groups::default();
-        for ([i, j], _) in &open {
-            group.join(*i, *j);
-        }
+        let mut groups = Sets::new(self.vertex_count());
+        open.iter().for_each(|([i, j], _)| groups.join(*i, *j));
         let mut loops: BTreeMap<u32, Vec<([u32; 2], i32)>> = BTreeMap::new();
         for (edge, imbalance) in &open {
-            loops.entry(group.find(edge[0])).or_default().push((*edge, *imbalance));
+            loops.entry(groups.root(edge[0])).or_default().push((*edge, *imbalance));
         }
         for edges in loops.into_values() {
             let mut rim: Vec<u32> = edges.iter().flat_map(|(edge, _)| *edge).collect();
@@ -243,29 +233,6 @@ impl Topology {
             }
         }
         !open.is_empty()
-    }
-}
-
-/// Union-find over vertex indices; the lowest vertex represents its group.
-#[derive(Default)]
-struct Groups {
-    parent: HashMap<u32, u32>,
-}
-
-impl Groups {
-    fn find(&mut self, vertex: u32) -> u32 {
-        let mut root = vertex;
-        while let Some(&parent) = self.parent.get(&root).filter(|&&parent| parent != root) {
-            root = parent;
-        }
-        self.parent.insert(vertex, root);
-        root
-    }
-
-    fn join(&mut self, i: u32, j: u32) {
-        let (i, j) = (self.find(i), self.find(j));
-        self.parent.insert(i.max(j), i.min(j));
-        self.parent.insert(i.min(j), i.min(j));
     }
 }
 

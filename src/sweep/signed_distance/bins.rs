@@ -6,10 +6,11 @@ use rayon::prelude::*;
 
 use crate::distance::Face;
 use crate::distance::lattice::{Fixed, UNITS};
-use crate::distance::lists::Lists;
-use crate::distance::region::{Region, each_block, extent};
+use crate::distance::region::{Region, extent};
 use crate::distance::vectors::{cross, difference, dot, sub};
 use crate::distance::winding::Lines;
+use crate::geometry::coords::between;
+use crate::geometry::lists::Lists;
 use crate::sweep::chain::prism::{Point, Prism, Prisms};
 
 /// Faces per task: fixed, so that nothing depends on the number of threads.
@@ -199,7 +200,7 @@ fn by_bin(corner: [i32; 3], ids: &[u32], faces: &[Face], normals: &[Point]) -> L
         let (v, normal) = (&faces[id as usize].v, &normals[id as usize]);
         each_bin(v, normal, corner, |voxel| pairs.push((inner(voxel) as u32, position as u32)));
     }
-    Lists::new(512, &[pairs])
+    Lists::new(512, pairs.iter().copied())
 }
 
 /// The voxel nearest to a point (fixed-point units).
@@ -235,14 +236,14 @@ fn by_block(faces: &[Face], normals: &[Point], region: &Region, slots: &[u32], c
             out
         })
         .collect();
-    Lists::new(count, &pairs)
+    Lists::new(count, pairs.iter().flatten().copied())
 }
 
 /// Calls `see` with the blocks of a region whose bins a triangle may pass through.
 fn each_position(v: &[Fixed; 3], normal: &Point, region: &Region, mut see: impl FnMut([i32; 3])) {
     let (first, last) = region.touched(extent(v), 0.5);
     let slab = Slab::new(v, normal, 4.0);
-    each_block(first, last)
+    between(first, last)
         .filter(|block| slab.touches(block.map(|b| f64::from(b) * 8.0 + 3.5)))
         .for_each(&mut see);
 }
@@ -253,7 +254,7 @@ fn each_bin(v: &[Fixed; 3], normal: &Point, corner: [i32; 3], mut see: impl FnMu
     let first = [0, 1, 2].map(|a| ((low[a] - 0.5).ceil() as i32).max(corner[a]));
     let last = [0, 1, 2].map(|a| ((high[a] + 0.5).floor() as i32).min(corner[a] + 7));
     let slab = Slab::new(v, normal, 0.5);
-    each_block(first, last).filter(|voxel| slab.touches(voxel.map(f64::from))).for_each(&mut see);
+    between(first, last).filter(|voxel| slab.touches(voxel.map(f64::from))).for_each(&mut see);
 }
 
 /// Calls `see` with the voxels of a region whose bins a triangle may pass through.

@@ -12,10 +12,10 @@ use rayon::prelude::*;
 use super::bins::Bins;
 use crate::distance::Face;
 use crate::distance::lattice::floor;
-use crate::distance::lists::Lists;
 use crate::distance::scanlines::Columns;
 use crate::distance::vectors::dot;
 use crate::distance::winding::{Axis, each_crossing};
+use crate::geometry::lists::Lists;
 use crate::numeric::blocks::offset;
 use crate::sweep::chain::prism::Point;
 
@@ -265,7 +265,7 @@ fn crossings(bins: &Bins, axis: Axis, columns: &Columns, counts: &[AtomicU16]) -
         out
     };
     let parts: Vec<Vec<(u32, Crossing)>> = bins.faces.par_chunks(GRAIN).enumerate().map(cross).collect();
-    Lists::new(columns.lines(), &parts)
+    Lists::new(columns.lines(), parts.iter().flatten().copied())
 }
 
 /// Which bins are stacks, from the number of crossings near each.

@@ -11,12 +11,15 @@ use crate::context::Context;
 use crate::distance::Face;
 use crate::distance::lattice::Lattice;
 use crate::distance::nearest::{Search, search};
-use crate::distance::region::{Region, each_block, extent};
+use crate::distance::region::{Region, extent};
 use crate::distance::signs::Signs;
 use crate::distance::triangle::Triangle;
 use crate::distance::vectors::gap;
 use crate::distance::winding::Lines;
 use crate::error::Result;
+use crate::geometry::coords::between;
+use crate::geometry::lists::Lists;
+use crate::geometry::mesh::drop_marked;
 use crate::numeric::blocks::{Mask, Origin, Values};
 use crate::numeric::lanes::LANES;
 use crate::sweep::chain::facet::Facet;
@@ -72,9 +75,8 @@ pub struct Voxeliser {
     facets: Vec<Facet>,
     /// Wanted blocks with facets in reach, in blocks from the origin voxel; ascending.
     near: Vec<[i32; 3]>,
-    /// `ids[start[i]..start[i + 1]]` are the facets of `near[i]`.
-    start: Vec<u32>,
-    ids: Vec<u32>,
+    /// The facets of each of these blocks.
+    ids: Lists<u32>,
     inside: Vec<[i32; 3]>,
 }
 
@@ -130,8 +132,8 @@ impl Voxeliser {
         ctx.check()?;
         let facets = facets(ctx, &bins, &exposure)?;
         ctx.advance();
-        let (near, start, ids, inside) = (Vec::new(), vec![0], Vec::new(), Vec::new());
-        let mut voxeliser = Self { lattice, band, bins, exposure, facets, near, start, ids, inside };
+        let (near, ids, inside) = (Vec::new(), Lists::one(Vec::new()), Vec::new());
+        let mut voxeliser = Self { lattice, band, bins, exposure, facets, near, ids, inside };
         let slots = voxeliser.sort_facets(&marked);
         let inside = voxeliser.find_inside(&slots);
         let wanted = wanted(&inside.iter().map(|&block| lattice.block_origin(block)).collect::<Vec<_>>())?;
@@ -171,21 +173,14 @@ impl Voxeliser {
                 out
             })
             .collect();
-        let mut count = vec![0u32; marked.len()];
-        pairs.iter().flatten().for_each(|&(block, _)| count[block as usize] += 1);
-        let mut slots = vec![NONE; count.len()];
-        for (block, &count) in count.iter().enumerate().filter(|(_, count)| **count > 0) {
-            slots[block] = self.near.len() as u32;
+        let mut slots = vec![NONE; marked.len()];
+        pairs.iter().flatten().for_each(|&(block, _)| slots[block as usize] = 0);
+        for (block, slot) in slots.iter_mut().enumerate().filter(|(_, slot)| **slot != NONE) {
+            *slot = self.near.len() as u32;
             self.near.push(self.bins.region.position(block));
-            self.start.push(self.start[self.start.len() - 1] + count);
         }
-        let mut position = self.start.clone();
-        self.ids = vec![0; self.start[self.start.len() - 1] as usize];
-        for &(block, id) in pairs.iter().flatten() {
-            let slot = &mut position[slots[block as usize] as usize];
-            self.ids[*slot as usize] = id;
-            *slot += 1;
-        }
+        let by_slot = pairs.iter().flatten().map(|&(block, id)| (slots[block as usize], id));
+        self.ids = Lists::new(self.near.len(), by_slot);
         slots
     }
 
@@ -201,7 +196,7 @@ impl Voxeliser {
         let centre = [0, 1, 2].map(|axis| (low[axis] + high[axis]) / 2.0);
         let radius = gap(low, high) / 2.0;
         let triangle = (radius > SMALL).then(|| Triangle::new(&facet.v, [0; 3]));
-        for block in each_block(first, last) {
+        for block in between(first, last) {
             let index = self.bins.region.index(block);
             if !marked[index] {
                 continue;
@@ -221,7 +216,7 @@ impl Voxeliser {
     fn find_inside(&self, slots: &[u32]) -> Vec<[i32; 3]> {
         let mut inside = Vec::new();
         let Region { low, high } = self.bins.region;
-        for [x, y, _] in each_block([low[0], low[1], 0], [high[0], high[1], 0]) {
+        for [x, y, _] in between([low[0], low[1], 0], [high[0], high[1], 0]) {
             let line = self.bins.lines.line(x * 8, y * 8);
             for pair in line.windows(2).filter(|pair| pair[0].1 >= 1) {
                 let first = (pair[0].0 / 8.0).ceil().max(f64::from(low[2])) as i32;
@@ -273,7 +268,7 @@ impl Voxeliser {
         scratch: &mut Scratch,
     ) -> bool {
         let corner = self.near[index].map(|b| b * 8);
-        let ids = &self.ids[self.start[index] as usize..self.start[index + 1] as usize];
+        let ids = self.ids.get(index);
         let triangles: Vec<Triangle> =
             ids.iter().map(|&id| Triangle::new(&self.facets[id as usize].v, corner)).collect();
         let (bins, exposure, facets) = (&self.bins, &self.exposure, &self.facets[..]);
@@ -346,10 +341,12 @@ fn sort_into_bins(
     let lines = Lines::scan(&faces, &region);
     ctx.advance();
     ctx.check()?;
-    retain(&mut faces, |face| {
+    let is_far = |face: &Face| {
         let (first, last) = region.touched(extent(&face.v), 0.0);
-        each_block(first, last).any(|block| relevant[region.index(block)])
-    });
+        !between(first, last).any(|block| relevant[region.index(block)])
+    };
+    let are_far: Vec<bool> = faces.par_iter().with_min_len(GRAIN).map(is_far).collect();
+    drop_marked(&mut faces, &are_far);
     let bins = Bins::new(faces, region, &relevant, lines);
     ctx.advance();
     ctx.check()?;
@@ -361,16 +358,9 @@ fn mark_near(faces: &[Face], region: &Region, reach: f32) -> Vec<bool> {
     let marks: Vec<AtomicBool> = (0..region.blocks()).map(|_| AtomicBool::new(false)).collect();
     faces.par_iter().with_min_len(GRAIN).for_each(|face| {
         let (first, last) = region.touched(extent(&face.v), reach);
-        each_block(first, last).for_each(|block| marks[region.index(block)].store(true, Ordering::Relaxed));
+        between(first, last).for_each(|block| marks[region.index(block)].store(true, Ordering::Relaxed));
     });
     marks.into_iter().map(AtomicBool::into_inner).collect()
-}
-
-/// Keeps the faces for which `keep` is true, in order.
-fn retain(faces: &mut Vec<Face>, keep: impl Fn(&Face) -> bool + Send + Sync) {
-    let kept: Vec<bool> = faces.par_iter().with_min_len(GRAIN).map(keep).collect();
-    let mut kept = kept.into_iter();
-    faces.retain(|_| kept.next().unwrap_or(false));
 }
 
 /// Makes the distances of inside voxels negative.

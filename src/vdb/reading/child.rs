@@ -15,41 +15,48 @@ use crate::vdb::vectors::AnyGrid;
 /// First argument of a program that is started to decode.
 pub(in crate::vdb) const COMMAND: &str = "decode-vdb-for-another-process";
 /// Version of the arguments and of parcels: it must be the same on both sides.
-pub(in crate::vdb) const PROTOCOL: &str = concat!("4-", env!("CARGO_PKG_VERSION"));
+pub(in crate::vdb) const PROTOCOL: &str = concat!("5-", env!("CARGO_PKG_VERSION"));
 
 /// What to read from a file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::vdb) enum Wanted<'a> {
     Infos,
     All,
-    /// Of floats.
-    First,
-    /// Of floats.
-    Named(&'a str),
-    /// Of floats, by its index.
-    Nth(&'a str),
-    /// Of floats or vectors.
-    FirstAny,
-    /// Of floats or vectors.
-    NamedAny(&'a str),
-    FirstPoints,
-    NamedPoints(&'a str),
+    /// The grid of floats of this name; none: the first.
+    Floats(Option<&'a str>),
+    /// The grid of floats with this index.
+    Nth(usize),
+    /// The same as `Floats`, of floats or vectors.
+    Any(Option<&'a str>),
+    Points(Option<&'a str>),
 }
 
-impl Wanted<'_> {
+impl<'a> Wanted<'a> {
     /// Encoded as two arguments.
-    pub(in crate::vdb) fn arguments(&self) -> [&str; 2] {
-        match self {
-            Self::Infos => ["infos", ""],
-            Self::All => ["all", ""],
-            Self::First => ["first", ""],
-            Self::Named(name) => ["named", name],
-            Self::Nth(index) => ["nth", index],
-            Self::FirstAny => ["first-any", ""],
-            Self::NamedAny(name) => ["named-any", name],
-            Self::FirstPoints => ["first-points", ""],
-            Self::NamedPoints(name) => ["named-points", name],
-        }
+    pub(in crate::vdb) fn arguments(&self) -> [String; 2] {
+        let (kind, name) = match self {
+            Self::Infos => ("infos", None),
+            Self::All => ("all", None),
+            Self::Floats(name) => ("floats", *name),
+            Self::Nth(index) => return ["nth".into(), index.to_string()],
+            Self::Any(name) => ("any", *name),
+            Self::Points(name) => ("points", *name),
+        };
+        [kind.into(), name.map(|name| format!("={name}")).unwrap_or_default()]
+    }
+
+    /// From these arguments.
+    fn of(kind: &str, name: &'a str) -> Option<Self> {
+        let named = name.strip_prefix('=');
+        Some(match kind {
+            "infos" => Self::Infos,
+            "all" => Self::All,
+            "floats" => Self::Floats(named),
+            "nth" => Self::Nth(name.parse().ok()?),
+            "any" => Self::Any(named),
+            "points" => Self::Points(named),
+            _ => return None,
+        })
     }
 }
 
@@ -77,18 +84,7 @@ pub fn serve(arguments: impl Iterator<Item = OsString>) -> Option<u8> {
     else {
         return Some(2);
     };
-    let wanted = match kind {
-        "infos" => Wanted::Infos,
-        "all" => Wanted::All,
-        "first" => Wanted::First,
-        "named" => Wanted::Named(name),
-        "nth" => Wanted::Nth(name),
-        "first-any" => Wanted::FirstAny,
-        "named-any" => Wanted::NamedAny(name),
-        "first-points" => Wanted::FirstPoints,
-        "named-points" => Wanted::NamedPoints(name),
-        _ => return Some(2),
-    };
+    let Some(wanted) = Wanted::of(kind, name) else { return Some(2) };
     if protocol != PROTOCOL || limit(Limits { memory, seconds }).is_err() {
         return Some(2);
     }
@@ -123,21 +119,17 @@ fn limit(limits: Limits) -> std::io::Result<()> {
 }
 
 fn contents(path: &Path, wanted: Wanted<'_>) -> Result<Contents> {
-    let points =
-        |name| decode::read_points(path, name).map(|(points, skipped)| Contents::Points(points, skipped));
+    let floats = |grid| Contents::Grids(vec![AnyGrid::Floats(grid)]);
     Ok(match wanted {
-        Wanted::FirstPoints => points(None)?,
-        Wanted::NamedPoints(name) => points(Some(name))?,
         Wanted::Infos => Contents::Infos(decode::describe(path)?),
         Wanted::All => Contents::Grids(decode::read(path)?.into_iter().map(AnyGrid::Floats).collect()),
-        Wanted::First => Contents::Grids(vec![AnyGrid::Floats(decode::read_named(path, None)?)]),
-        Wanted::Named(name) => Contents::Grids(vec![AnyGrid::Floats(decode::read_named(path, Some(name))?)]),
-        Wanted::Nth(index) => {
-            let index = index.parse().map_err(|_| Error::Bytes("is no index of a grid".into()))?;
-            Contents::Grids(vec![AnyGrid::Floats(decode::read_nth(path, index)?)])
+        Wanted::Floats(name) => floats(decode::read_named(path, name)?),
+        Wanted::Nth(index) => floats(decode::read_nth(path, index)?),
+        Wanted::Any(name) => Contents::Grids(vec![decode::read_any(path, name)?]),
+        Wanted::Points(name) => {
+            let (points, skipped) = decode::read_points(path, name)?;
+            Contents::Points(points, skipped)
         }
-        Wanted::FirstAny => Contents::Grids(vec![decode::read_any(path, None)?]),
-        Wanted::NamedAny(name) => Contents::Grids(vec![decode::read_any(path, Some(name))?]),
     })
 }
 

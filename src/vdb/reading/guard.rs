@@ -95,7 +95,7 @@ impl Guard {
     /// # Errors
     /// As [`Guard::describe`].
     pub fn read_named(&self, path: &Path, name: Option<&str>) -> Result<FloatGrid> {
-        floats(path, self.one(path, name.map_or(Wanted::First, Wanted::Named))?)
+        floats(path, self.one(path, Wanted::Floats(name))?)
     }
 
     /// As [`crate::vdb::file::read_nth`].
@@ -103,7 +103,7 @@ impl Guard {
     /// # Errors
     /// As [`Guard::describe`].
     pub fn read_nth(&self, path: &Path, index: usize) -> Result<FloatGrid> {
-        floats(path, self.one(path, Wanted::Nth(&index.to_string()))?)
+        floats(path, self.one(path, Wanted::Nth(index))?)
     }
 
     /// As [`crate::vdb::file::read_any`].
@@ -111,7 +111,7 @@ impl Guard {
     /// # Errors
     /// As [`Guard::describe`].
     pub fn read_any(&self, path: &Path, name: Option<&str>) -> Result<AnyGrid> {
-        self.one(path, name.map_or(Wanted::FirstAny, Wanted::NamedAny))
+        self.one(path, Wanted::Any(name))
     }
 
     /// As [`crate::vdb::points::read`].
@@ -119,7 +119,7 @@ impl Guard {
     /// # Errors
     /// As [`Guard::describe`].
     pub fn read_points(&self, path: &Path, name: Option<&str>) -> Result<Points> {
-        match self.ask(path, name.map_or(Wanted::FirstPoints, Wanted::NamedPoints))? {
+        match self.ask(path, Wanted::Points(name))? {
             Contents::Points(points, skipped) => {
                 point_arrays::warn_of(path, &skipped);
                 Ok(points)

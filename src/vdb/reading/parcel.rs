@@ -58,8 +58,10 @@ pub(in crate::vdb) fn pack(mut file: &File, contents: &Contents) -> Result<(), S
             head.number(infos.len() as u64);
             infos.iter().for_each(|info| head.info(info));
         }
-        // Written below: points have no leaves.
-        Contents::Points(..) => {}
+        Contents::Points(points, skipped) => {
+            head.number(3);
+            parcel_points::describe(&mut head, points, skipped);
+        }
         Contents::Grids(grids) => {
             head.number(2);
             head.number(grids.len() as u64);
@@ -73,10 +75,6 @@ pub(in crate::vdb) fn pack(mut file: &File, contents: &Contents) -> Result<(), S
                 lists.push(leaves);
             }
         }
-    }
-    if let Contents::Points(points, skipped) = contents {
-        head.number(3);
-        parcel_points::describe(&mut head, points, skipped);
     }
     let io = |error: std::io::Error| error.to_string();
     let start = [&[0; 8][..], &(head.0.len() as u64).to_le_bytes(), &head.0].concat();

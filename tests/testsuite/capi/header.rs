@@ -31,7 +31,7 @@ fn functions_say_which_threads_may_call_them() {
 fn every_function_that_writes_a_struct_is_tried_on_a_guard_page() {
     let writers = struct_writers();
     assert!(writers.len() > 40 && writers.contains("frz_grains_params_of_snow"), "{writers:?}");
-    let tables = ["tests/ctest/guard_page.c", "tests/ctest_core/guard_page.c"].map(|path| {
+    let tables = ["tests/ctest/full/guard_page.c", "tests/ctest/core/guard_page.c"].map(|path| {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
         std::fs::read_to_string(path).expect("a program")
     });

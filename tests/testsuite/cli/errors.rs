@@ -1,10 +1,10 @@
 //! Whatever is wrong with its input, the program says so in one sentence, with the right exit code, and
 //! leaves nothing half-written.
 
+use crate::program::Folder;
 use assert_cmd::Command;
 use std::fs;
 use std::path::Path;
-use tempfile::TempDir;
 
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
 f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
@@ -12,10 +12,10 @@ const SCENE: &str = "[shot]\nframes = \"1-2\"\n[snow]\nground = 0.0\narea = [-0.
 depth = 0.3\ncell = 0.05\n[[object]]\nfile = \"cube.obj\"\n";
 
 /// A folder with a cube and a scene.
-fn folder() -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
-    fs::write(folder.path().join("shot.toml"), SCENE).unwrap();
+fn folder() -> Folder {
+    let folder = Folder::empty();
+    fs::write(folder.join("cube.obj"), CUBE).unwrap();
+    fs::write(folder.join("shot.toml"), SCENE).unwrap();
     folder
 }
 
@@ -53,27 +53,27 @@ fn listing(folder: &Path) -> Vec<String> {
 #[test]
 fn a_wrong_option_is_one_sentence() {
     let folder = folder();
-    refuses(folder.path(), "snow shot.toml", 2, &["--output"]);
-    refuses(folder.path(), "snow shot.toml -o out --frmaes 1-2", 2, &["--frmaes", "--frames"]);
-    refuses(folder.path(), "snow shot.toml -o out --frames 2-1", 2, &["ends before it starts"]);
-    refuses(folder.path(), "snow shot.toml -o out --frames 1-9", 2, &["1-9", "1-2"]);
-    refuses(folder.path(), "snow shot.toml -o out --frames 1-2x0", 2, &["choice of frames"]);
-    refuses(folder.path(), "snow shot.toml -o out --max-memory lots", 2, &["--max-memory"]);
-    refuses(folder.path(), "brew", 2, &["brew"]);
-    refuses(folder.path(), "vdb from-mesh cube.obj --cell=-1 -o out.vdb", 2, &["--cell"]);
-    refuses(folder.path(), "vdb from-mesh cube.obj --cell 0.1 -o out.obj", 2, &["out.obj", ".vdb"]);
+    refuses(&folder, "snow shot.toml", 2, &["--output"]);
+    refuses(&folder, "snow shot.toml -o out --frmaes 1-2", 2, &["--frmaes", "--frames"]);
+    refuses(&folder, "snow shot.toml -o out --frames 2-1", 2, &["ends before it starts"]);
+    refuses(&folder, "snow shot.toml -o out --frames 1-9", 2, &["1-9", "1-2"]);
+    refuses(&folder, "snow shot.toml -o out --frames 1-2x0", 2, &["choice of frames"]);
+    refuses(&folder, "snow shot.toml -o out --max-memory lots", 2, &["--max-memory"]);
+    refuses(&folder, "brew", 2, &["brew"]);
+    refuses(&folder, "vdb from-mesh cube.obj --cell=-1 -o out.vdb", 2, &["--cell"]);
+    refuses(&folder, "vdb from-mesh cube.obj --cell 0.1 -o out.obj", 2, &["out.obj", ".vdb"]);
 }
 
 #[test]
 fn missing_and_empty_files_are_named() {
     let folder = folder();
-    refuses(folder.path(), "snow none.toml -o out", 2, &["none.toml", "cannot read"]);
-    refuses(folder.path(), "vdb from-mesh none.obj --cell 0.1 -o out.vdb", 2, &["none.obj"]);
-    refuses(folder.path(), "info none.vdb", 2, &["none.vdb"]);
+    refuses(&folder, "snow none.toml -o out", 2, &["none.toml", "cannot read"]);
+    refuses(&folder, "vdb from-mesh none.obj --cell 0.1 -o out.vdb", 2, &["none.obj"]);
+    refuses(&folder, "info none.vdb", 2, &["none.vdb"]);
     for name in ["empty.obj", "empty.ply", "empty.vdb"] {
-        fs::write(folder.path().join(name), "").unwrap();
-        refuses(folder.path(), &format!("info {name}"), 2, &[name, "empty"]);
-        refuses(folder.path(), &format!("preview {name} -o out.png"), 2, &[name, "empty"]);
+        fs::write(folder.join(name), "").unwrap();
+        refuses(&folder, &format!("info {name}"), 2, &[name, "empty"]);
+        refuses(&folder, &format!("preview {name} -o out.png"), 2, &[name, "empty"]);
     }
 }
 
@@ -87,11 +87,11 @@ fn meshes_that_cannot_be_used_are_named_with_the_fault() {
         ("points.obj", CUBE.split("f ").next().unwrap().to_string(), "faces"),
     ];
     for (name, text, fault) in wrong {
-        fs::write(folder.path().join(name), text).unwrap();
-        refuses(folder.path(), &format!("vdb from-mesh {name} --cell 0.1 -o out.vdb"), 2, &[name, fault]);
+        fs::write(folder.join(name), text).unwrap();
+        refuses(&folder, &format!("vdb from-mesh {name} --cell 0.1 -o out.vdb"), 2, &[name, fault]);
         let scene = SCENE.replace("cube.obj", name);
-        fs::write(folder.path().join("wrong.toml"), scene).unwrap();
-        refuses(folder.path(), "snow wrong.toml -o out", 2, &[name, fault]);
+        fs::write(folder.join("wrong.toml"), scene).unwrap();
+        refuses(&folder, "snow wrong.toml -o out", 2, &[name, fault]);
     }
 }
 
@@ -134,7 +134,7 @@ fn scene_mistakes_are_named_with_line_and_key() {
         ),
     ];
     for (from, to, sentence) in wrong {
-        fs::write(folder.path().join("shot.toml"), SCENE.replacen(from, to, 1)).unwrap();
-        refuses(folder.path(), "snow shot.toml -o out", 2, &[sentence]);
+        fs::write(folder.join("shot.toml"), SCENE.replacen(from, to, 1)).unwrap();
+        refuses(&folder, "snow shot.toml -o out", 2, &[sentence]);
     }
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::common::hero;
 use crate::common::liquids::{ball, write_cache};
-use crate::program::{CUBE, GRAINS};
+use crate::program::{CUBE, Folder, GRAINS};
 
 const README: &str = include_str!("../../../README.md");
 const CLI: &str = include_str!("../../../docs/cli.md");
@@ -40,20 +40,20 @@ fn lines(block: &'static str) -> Vec<&'static str> {
 
 #[test]
 fn the_readme_runs() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("boot.obj"), CUBE).unwrap();
-    write_cache(folder.path(), "spot", &ball(4.0, 8, 0.0), 3);
+    let folder = Folder::empty();
+    fs::write(folder.join("boot.obj"), CUBE).unwrap();
+    write_cache(&folder, "spot", &ball(4.0, 8, 0.0), 3);
     // As in the README but for the cells: a test need not be fine.
     let scene = block(README, "## Commands", "toml").replace("cell = 0.005", "cell = 0.02");
     assert!(scene.contains("cell = 0.02"));
-    fs::write(folder.path().join("shot.toml"), scene).unwrap();
+    fs::write(folder.join("shot.toml"), scene).unwrap();
     let spill = "[shot]\nframes = \"1-3\"\n[shallow]\nterrain = \"boot.obj\"\ncell = 0.02\n\
                  [[source]]\nat = [0.0, 0.42, 0.0]\nradius = 0.05\nrate_ml = 100.0\n";
-    fs::write(folder.path().join("spill.toml"), spill).unwrap();
+    fs::write(folder.join("spill.toml"), spill).unwrap();
     let lines = lines(block(README, "## Commands", "sh"));
     assert!(lines.len() >= 8, "{lines:?}");
     lines.iter().for_each(|line| {
-        works(folder.path(), line);
+        works(&folder, line);
     });
 }
 
@@ -72,17 +72,17 @@ fn write_scenes(folder: &Path) {
 
 #[test]
 fn the_readme_takes_a_character_through_snow() {
-    let folder = tempfile::tempdir().unwrap();
-    write_scenes(folder.path());
+    let folder = Folder::empty();
+    write_scenes(&folder);
     // Our own figure in the place of CesiumMan: it has two clips.
-    let path = folder.path().join("examples/scenes/walking_character.toml");
+    let path = folder.join("examples/scenes/walking_character.toml");
     let text = fs::read_to_string(&path).unwrap().replace("scale =", "clip = \"walk\"\nscale =");
     fs::write(&path, text).unwrap();
-    fs::write(folder.path().join("CesiumMan.glb"), hero::glb()).unwrap();
+    fs::write(folder.join("CesiumMan.glb"), hero::glb()).unwrap();
     let lines = lines(block(README, "## A character walks", "sh"));
     assert_eq!(lines.len(), 4, "{lines:?}");
     lines.iter().for_each(|line| {
-        works(folder.path(), line);
+        works(&folder, line);
     });
 }
 
@@ -110,19 +110,19 @@ fn the_example_scenes_are_sound() {
 
 #[test]
 fn the_page_of_the_command_line_runs() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("hero.glb"), hero::glb()).unwrap();
+    let folder = Folder::empty();
+    fs::write(folder.join("hero.glb"), hero::glb()).unwrap();
     let (shot, rebuild) = ("## A shot from beginning", "## What a folder holds");
     let mut count = 0;
     for line in lines(block(CLI, shot, "sh")) {
         if line.starts_with("frazil preview") {
             // What comes next asks for a cache of changes.
-            works(folder.path(), "frazil snow shot.toml -o changes -q --set output.base_mode=delta");
+            works(&folder, "frazil snow shot.toml -o changes -q --set output.base_mode=delta");
         }
-        works(folder.path(), line);
+        works(&folder, line);
         if line.starts_with("frazil new") {
             // As one would edit it.
-            let path = folder.path().join("shot.toml");
+            let path = folder.join("shot.toml");
             let text = fs::read_to_string(&path).unwrap();
             let edited =
                 text.replace("# clip = \"Walk\"", "clip = \"walk\"").replace("cell = 0.0075", "cell = 0.03");
@@ -132,12 +132,12 @@ fn the_page_of_the_command_line_runs() {
         count += 1;
     }
     for line in lines(block(CLI, rebuild, "sh")) {
-        works(folder.path(), &line.replace("cache/", "changes/"));
+        works(&folder, &line.replace("cache/", "changes/"));
         count += 1;
     }
     for line in lines(block(CLI, "## Pictures", "sh")) {
         // A few frames show as much as all.
-        works(folder.path(), &line.replace(" -o shot.gif", " --frames 1-120x40 -o shot.gif"));
+        works(&folder, &line.replace(" -o shot.gif", " --frames 1-120x40 -o shot.gif"));
         count += 1;
     }
     assert_eq!(count, 15);
@@ -164,38 +164,38 @@ fn write_splash(folder: &Path) {
 
 #[test]
 fn the_page_of_the_command_line_makes_surfaces_of_particles() {
-    let folder = tempfile::tempdir().unwrap();
-    write_splash(folder.path());
-    fs::write(folder.path().join("rock.obj"), CUBE).unwrap();
+    let folder = Folder::empty();
+    write_splash(&folder);
+    fs::write(folder.join("rock.obj"), CUBE).unwrap();
     let lines = lines(block(CLI, "## Surfaces of particles", "sh"));
     assert_eq!(lines.len(), 7, "{lines:?}");
     lines.iter().for_each(|line| {
-        works(folder.path(), line);
+        works(&folder, line);
     });
 }
 
 #[test]
 fn the_page_of_the_command_line_handles_points() {
-    let folder = tempfile::tempdir().unwrap();
-    write_grains(folder.path());
+    let folder = Folder::empty();
+    write_grains(&folder);
     let lines = lines(block(CLI, "## Points", "sh"));
     assert_eq!(lines.len(), 7, "{lines:?}");
     lines.iter().for_each(|line| {
-        works(folder.path(), line);
+        works(&folder, line);
     });
 }
 
 #[test]
 fn the_page_of_the_command_line_repairs_meshes() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     // A cube without its lid.
     let (open, _) = CUBE.rsplit_once("f ").unwrap();
     for name in ["broken", "broken.0001", "broken.0002"] {
-        fs::write(folder.path().join(format!("{name}.obj")), open).unwrap();
+        fs::write(folder.join(format!("{name}.obj")), open).unwrap();
     }
     let lines = lines(block(CLI, "## Repaired meshes", "sh"));
     assert_eq!(lines.len(), 4, "{lines:?}");
-    let said: Vec<String> = lines.iter().map(|line| works(folder.path(), line)).collect();
+    let said: Vec<String> = lines.iter().map(|line| works(&folder, line)).collect();
     assert!(said[0].starts_with("broken.obj: a solid now, in solid.ply\n"), "{}", said[0]);
     assert!(said[1].starts_with("solid.ply: a solid\n"), "{}", said[1]);
 }
@@ -211,8 +211,7 @@ fn commands_of(folder: &Path, command: &str) -> Vec<String> {
 
 #[test]
 fn every_command_has_help_with_an_example_that_runs() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     for name in ["boot", "box", "bunny", "before", "after", "body.0001", "body.0002"] {
         fs::write(folder.join(format!("{name}.obj")), CUBE).unwrap();
     }
@@ -257,18 +256,17 @@ fn every_command_has_help_with_an_example_that_runs() {
 
 #[test]
 fn the_docs_have_every_key_of_a_scene() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let (snow, shallow) = SCENE.split_once("\n## Keys of a little liquid\n\n").unwrap();
     for (text, system) in [(snow.split("## Keys\n\n").nth(1).unwrap(), "snow"), (shallow, "shallow")] {
-        let keys = works(folder.path(), &format!("frazil new {system} --keys"));
+        let keys = works(&folder, &format!("frazil new {system} --keys"));
         assert!(text == keys, "docs/scene.md is not what `frazil new {system} --keys` says:\n{keys}");
     }
 }
 
 #[test]
 fn the_page_of_surface_runs_and_has_every_key() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     const SURFACE: &str = include_str!("../../../docs/surface.md");
     let keys = works(folder, "frazil new surface --keys");
     let said = "docs/surface.md is not what `frazil new surface --keys` says";
@@ -293,14 +291,14 @@ fn the_page_of_surface_runs_and_has_every_key() {
 
 #[test]
 fn a_check_lists_every_setting() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("hero.obj"), CUBE).unwrap();
-    let scene = works(folder.path(), "frazil new snow")
+    let folder = Folder::empty();
+    fs::write(folder.join("hero.obj"), CUBE).unwrap();
+    let scene = works(&folder, "frazil new snow")
         .replace("hero.glb", "hero.obj")
         .replace("cell = 0.0075", "cell = 0.1");
-    fs::write(folder.path().join("shot.toml"), scene).unwrap();
+    fs::write(folder.join("shot.toml"), scene).unwrap();
     let report: serde_json::Value =
-        serde_json::from_str(&works(folder.path(), "frazil check shot.toml --json")).unwrap();
+        serde_json::from_str(&works(&folder, "frazil check shot.toml --json")).unwrap();
     let settings = &report["settings"];
     assert_eq!(settings["snow.noise.amplitude"], 0.2);
     assert_eq!(settings["shot.frames"], "1-120");

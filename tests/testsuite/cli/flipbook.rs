@@ -12,24 +12,21 @@ use frazil::vdb::{FloatGrid, GridClass};
 use frazil::{Context, Pool};
 
 use crate::picture::Picture;
-use crate::program::{CUBE, GRAINS, answer_to_sigterm, command, fails, works};
+use crate::program::{CUBE, Folder, GRAINS, answer_to_sigterm, command, fails, works};
 
 const SIZE: &str = "--size 96x64";
 
 /// A folder with a shot of four frames, 12 a second, in `shot`: a cube is pushed through snow. The same as changes is in
 /// `delta`.
-fn shots() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
+fn shots() -> Folder {
+    let folder = Folder::empty();
+    fs::write(folder.join("cube.obj"), CUBE).unwrap();
     let scene = "[shot]\nframes = \"1-4\"\nfps = 12\n[snow]\nground = 0.0\narea = [-0.6, -0.6, 0.6, 1.0]\ndepth = 0.3\n\
                  cell = 0.04\n[grains]\n[output]\nobjects = [\"ply\"]\n[[object]]\nfile = \"cube.obj\"\n\
                  keys = [{ frame = 1, at = [0, 0.1, 0] }, { frame = 4, at = [0, 0.1, 0.3] }]\n";
-    fs::write(folder.path().join("shot.toml"), scene).unwrap();
-    works(folder.path(), "snow shot.toml -o shot -q");
-    works(
-        folder.path(),
-        "snow shot.toml -o delta -q --set output.base_mode=delta --set output.grains_mode=delta",
-    );
+    fs::write(folder.join("shot.toml"), scene).unwrap();
+    works(&folder, "snow shot.toml -o shot -q");
+    works(&folder, "snow shot.toml -o delta -q --set output.base_mode=delta --set output.grains_mode=delta");
     folder
 }
 
@@ -59,8 +56,7 @@ fn frames(path: &Path) -> Vec<(Vec<[u8; 3]>, u16)> {
 
 #[test]
 fn each_frame_of_a_shot_is_what_its_files_show() {
-    let folder = shots();
-    let folder = folder.path();
+    let folder = &shots();
     let camera = "--eye 1,1.2,2 --target 0,0.2,0.2";
     works(folder, &format!("preview shot --frames 1-4x3 -o p.%04d.png {SIZE} {camera} -q"));
     works(folder, &format!("preview delta --frames 2-4 -o d.%04d.png {SIZE} {camera} -q --threads 1"));
@@ -84,8 +80,8 @@ fn each_frame_of_a_shot_is_what_its_files_show() {
 #[test]
 fn the_camera_of_a_flipbook_stands_still() {
     let folder = shots();
-    works(folder.path(), &format!("preview shot -o p.%02d.png {SIZE} -q"));
-    let [first, last] = ["p.01.png", "p.04.png"].map(|name| Picture::open(&folder.path().join(name)));
+    works(&folder, &format!("preview shot -o p.%02d.png {SIZE} -q"));
+    let [first, last] = ["p.01.png", "p.04.png"].map(|name| Picture::open(&folder.join(name)));
     let changed = first.pixels.iter().zip(&last.pixels).filter(|(a, b)| a != b).count();
     // What the cube moves through, and no edge of the snow.
     assert!((50..96 * 64 / 2).contains(&changed), "{changed}");
@@ -96,8 +92,7 @@ fn the_camera_of_a_flipbook_stands_still() {
 
 #[test]
 fn a_gif_plays_the_pictures_at_the_speed_of_the_shot() {
-    let folder = shots();
-    let folder = folder.path();
+    let folder = &shots();
     works(folder, &format!("preview shot -o p.%04d.png {SIZE} -q --threads 1"));
     works(folder, &format!("preview shot -o shot.gif {SIZE} -q --threads 1"));
     works(folder, &format!("preview shot --frames 1-4 -o again.gif {SIZE} -q --threads 3"));
@@ -144,8 +139,7 @@ fn add_mist(folder: &Path, frame: i32, blocks: usize) {
 
 #[test]
 fn mist_is_drawn_over_the_snow_of_its_frame() {
-    let folder = shots();
-    let folder = folder.path();
+    let folder = &shots();
     let draw = |what: &str| {
         works(folder, &format!("preview {what} -o p.png {SIZE}"));
         read(folder, "p.png")
@@ -184,8 +178,7 @@ fn mist_is_drawn_over_the_snow_of_its_frame() {
 
 #[test]
 fn what_cannot_be_drawn_is_said_before_anything_is_written() {
-    let folder = shots();
-    let folder = folder.path();
+    let folder = &shots();
     fs::create_dir(folder.join("bare")).unwrap();
     fs::write(folder.join("grains.ply"), GRAINS).unwrap();
     works(folder, "snow shot.toml -o first -q --frames 1");
@@ -236,8 +229,7 @@ fn what_cannot_be_drawn_is_said_before_anything_is_written() {
 
 #[test]
 fn a_damaged_frame_costs_a_flipbook_no_other_picture() {
-    let folder = shots();
-    let folder = folder.path();
+    let folder = &shots();
     // Of the length that its record names; the camera is found without it.
     let path = folder.join("shot/base/base.0002.vdb");
     let mut bytes = fs::read(&path).unwrap();
@@ -259,8 +251,7 @@ fn parts(folder: &Path) -> Vec<String> {
 
 #[test]
 fn a_flipbook_that_is_stopped_leaves_nothing_half_written() {
-    let folder = shots();
-    let folder = folder.path();
+    let folder = &shots();
     let child = command(folder, "preview shot -o p.gif --size 3000x2000 -q").spawn().unwrap();
     let begun = Instant::now();
     while parts(folder).is_empty() && begun.elapsed() < Duration::from_secs(60) {

@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use crate::common::liquids::{ball, write_cache};
-use crate::program::{CUBE, fails, works};
+use crate::program::{CUBE, Folder, fails, works};
 
 fn report(folder: &Path, options: &str) -> Value {
     serde_json::from_str(&works(folder, &format!("check shot.toml --json -q {options}"))).unwrap()
@@ -36,8 +36,7 @@ fn liquid(folder: &Path, radius: f64, n: usize) {
 
 #[test]
 fn files_of_a_mesh_on_a_liquid_take_about_what_check_says() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     liquid(folder, 8.0, 12);
     let all = "--set output.surface=[\"ply\",\"usd\",\"obj\"]";
     for (out, options) in [("ply", ""), ("bare", "--set output.attributes=[]"), ("all", all)] {
@@ -53,8 +52,7 @@ fn files_of_a_mesh_on_a_liquid_take_about_what_check_says() {
 
 #[test]
 fn memory_of_a_mesh_on_a_liquid_is_about_what_check_says() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     liquid(folder, 20.0, 40);
     let said = report(folder, "");
     let memory = number(&said, "memory_bytes");
@@ -77,9 +75,9 @@ fn memory_of_a_mesh_on_a_liquid_is_about_what_check_says() {
 
 #[test]
 fn a_surface_has_no_preview() {
-    let folder = tempfile::tempdir().unwrap();
-    liquid(folder.path(), 3.0, 4);
-    fails(folder.path(), "check shot.toml --preview 4", 2, &["--preview is for snow"]);
+    let folder = Folder::empty();
+    liquid(&folder, 3.0, 4);
+    fails(&folder, "check shot.toml --preview 4", 2, &["--preview is for snow"]);
 }
 
 /// A cube that slides through snow by 0.4 m in 10 frames, with grains and mist.
@@ -93,8 +91,7 @@ fn snow(folder: &Path) {
 
 #[test]
 fn before_mist_is_made_the_boxes_of_objects_are_filled_with_it() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     snow(folder);
     let said = report(folder, "-o cache");
     let mist = &said["mist"];
@@ -135,8 +132,7 @@ fn before_mist_is_made_the_boxes_of_objects_are_filled_with_it() {
 
 #[test]
 fn a_long_shot_fills_the_same_boxes() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     snow(folder);
     let cells = || number(&report(folder, "")["mist"], "cells");
     let short = cells();
@@ -148,8 +144,7 @@ fn a_long_shot_fills_the_same_boxes() {
 
 #[test]
 fn few_digits_of_a_cell_are_told() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     snow(folder);
     let text = works(folder, "check shot.toml --set mist.cell=0.026666666666666668 --max-memory 2M");
     assert!(text.contains(" cells of 0.0267 m, as many as"), "{text}");
@@ -157,8 +152,7 @@ fn few_digits_of_a_cell_are_told() {
 
 #[test]
 fn mist_that_was_not_raised_takes_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     snow(folder);
     // No grain is as fast.
     let calm = "--set mist.from_speed=900";
@@ -176,8 +170,7 @@ fn mist_that_was_not_raised_takes_nothing() {
 
 #[test]
 fn mist_that_was_made_says_how_far_it_spreads() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     snow(folder);
     works(folder, "snow shot.toml -o cache -q --frames 1-8");
     let of_frame = |frame: i32| -> f64 {

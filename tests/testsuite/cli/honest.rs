@@ -2,7 +2,7 @@
 
 use crate::common::shapes;
 use crate::picture::Picture;
-use crate::program::{CUBE, fails, works};
+use crate::program::{CUBE, Folder, fails, works};
 use frazil::numeric::blocks::{Block, BlockEdit};
 use frazil::vdb::file::{self, WriteOptions};
 use frazil::vdb::level_set::{self, Scheme};
@@ -10,26 +10,26 @@ use frazil::vdb::{FloatGrid, GridClass};
 use frazil::{Context, Pool};
 use std::fs;
 
-fn folder(snow: &str) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
+fn folder(snow: &str) -> Folder {
+    let folder = Folder::empty();
+    fs::write(folder.join("cube.obj"), CUBE).unwrap();
     let scene = format!("[shot]\nframes = \"1\"\n[snow]\n{snow}\n[[object]]\nfile = \"cube.obj\"\n");
-    fs::write(folder.path().join("shot.toml"), scene).unwrap();
+    fs::write(folder.join("shot.toml"), scene).unwrap();
     folder
 }
 
 #[test]
 fn a_layer_that_cells_cannot_hold_is_refused_and_a_rough_one_is_reported() {
     let folder = folder("ground = 0.0\narea = [-1, -1, 1, 1]\ndepth = 0.3\ncell = 0.05");
-    assert!(!works(folder.path(), "check shot.toml").contains("cells thick"));
+    assert!(!works(&folder, "check shot.toml").contains("cells thick"));
     for command in ["check shot.toml", "snow shot.toml -o out"] {
         let set = |what: &str| format!("{command} --set {what}");
-        fails(folder.path(), &set("snow.cell=10"), 2, &["shot.toml", "depth = 0.3 m", "cell of 10 m"]);
-        fails(folder.path(), &set("snow.depth=0.04"), 2, &["depth = 0.04 m", "less than a cell"]);
-        fails(folder.path(), &set("snow.area=[-1,0,1,0.02]"), 2, &["extent in z", "less than a cell"]);
-        assert!(works(folder.path(), &set("snow.depth=0.1")).contains("thick"), "two cells are reported");
+        fails(&folder, &set("snow.cell=10"), 2, &["shot.toml", "depth = 0.3 m", "cell of 10 m"]);
+        fails(&folder, &set("snow.depth=0.04"), 2, &["depth = 0.04 m", "less than a cell"]);
+        fails(&folder, &set("snow.area=[-1,0,1,0.02]"), 2, &["extent in z", "less than a cell"]);
+        assert!(works(&folder, &set("snow.depth=0.1")).contains("thick"), "two cells are reported");
     }
-    assert!(!folder.path().join("out/base/base.0002.vdb").exists());
+    assert!(!folder.join("out/base/base.0002.vdb").exists());
 }
 
 #[test]
@@ -51,16 +51,16 @@ fn an_offset_beyond_the_band_is_right_or_refused() {
     }
     level_set::offset(&ctx, &mut make(), 0.06, Scheme::FirstOrder).unwrap();
     let folder = folder("");
-    let path = folder.path().join("ball.vdb");
+    let path = folder.join("ball.vdb");
     file::write(&path, &[&make()], &WriteOptions::default()).unwrap();
     fails(
-        folder.path(),
+        &folder,
         "vdb offset ball.vdb --by -0.3 --scheme first-order -o out.vdb",
         2,
         &["--scheme", "weno5"],
     );
-    works(folder.path(), "vdb offset ball.vdb --by -0.3 -o out.vdb");
-    let found = measured(&file::read_named(&folder.path().join("out.vdb"), None).unwrap());
+    works(&folder, "vdb offset ball.vdb --by -0.3 -o out.vdb");
+    let found = measured(&file::read_named(&folder.join("out.vdb"), None).unwrap());
     assert!((found - (measured(&make()) - 0.3)).abs() < 0.15 * cell, "{found}");
 }
 
@@ -78,17 +78,17 @@ fn a_mesh_far_from_the_origin_is_named_with_what_to_do() {
             None => format!("{line}\n"),
         })
         .collect();
-    fs::write(folder.path().join("far.obj"), far).unwrap();
+    fs::write(folder.join("far.obj"), far).unwrap();
     for command in
         ["check shot.toml --set object.1.file=far.obj", "vdb from-mesh far.obj --cell 0.01 -o out.vdb"]
     {
-        let said = works(folder.path(), command);
+        let said = works(&folder, command);
         for word in ["far.obj", "60000 m from the origin", "3.9 mm", "64 bits"] {
             assert!(said.contains(word), "{command}: no {word:?} in {said}");
         }
     }
     let near = "check shot.toml --set object.1.keys=[{frame=1,at=[60000,0.1,0]}]";
-    assert!(!works(folder.path(), near).contains("origin"), "keys are 64-bit");
+    assert!(!works(&folder, near).contains("origin"), "keys are 64-bit");
 }
 
 #[test]
@@ -107,11 +107,11 @@ fn a_fog_volume_is_drawn_as_fog() {
     fog.replace_blocks(&ctx, &[block(1.0)]).unwrap();
     fog.set_class(GridClass::Fog).unwrap();
     fog.set_name("density").unwrap();
-    let path = folder.path().join("cloud.vdb");
+    let path = folder.join("cloud.vdb");
     file::write(&path, &[&fog], &WriteOptions::default()).unwrap();
     let draw = |options: &str| {
-        works(folder.path(), &format!("preview cloud.vdb -o out.png --size 90x60 {options}"));
-        Picture::open(&folder.path().join("out.png"))
+        works(&folder, &format!("preview cloud.vdb -o out.png --size 90x60 {options}"));
+        Picture::open(&folder.join("out.png"))
     };
     let [thin, thick] = ["--fog-density 0.1", "--fog-density 40"].map(draw);
     let changed = |picture: &Picture| {
@@ -126,18 +126,18 @@ fn a_fog_volume_is_drawn_as_fog() {
     );
     fog.replace_blocks(&ctx, &[block(0.0)]).unwrap();
     file::write(&path, &[&fog], &WriteOptions::default()).unwrap();
-    fails(folder.path(), "preview cloud.vdb -o out.png", 2, &["cloud.vdb", "\"density\"", "no density"]);
+    fails(&folder, "preview cloud.vdb -o out.png", 2, &["cloud.vdb", "\"density\"", "no density"]);
 }
 
 #[test]
 fn the_disk_space_is_reported_for_a_layer_from_a_file() {
     // So large that the layer takes most of the disk.
     let folder = folder("ground = 0.0\narea = [-3, -3, 3, 3]\ndepth = 0.3\ncell = 0.02");
-    works(folder.path(), "snow shot.toml -o out -q");
+    works(&folder, "snow shot.toml -o out -q");
     let scene = "[shot]\nframes = \"1-10\"\n[snow]\ntop = \"out/base/base.0001.vdb\"\ncell = 0.02\n[[object]]\nfile = \"cube.obj\"\n";
-    fs::write(folder.path().join("next.toml"), scene).unwrap();
+    fs::write(folder.join("next.toml"), scene).unwrap();
     let disk = |scene: &str| {
-        let said = works(folder.path(), &format!("check {scene} --set shot.frames=1-10 --json"));
+        let said = works(&folder, &format!("check {scene} --set shot.frames=1-10 --json"));
         serde_json::Deserializer::from_str(&said).into_iter::<serde_json::Value>().next().unwrap().unwrap()["disk_bytes"]
             .as_f64()
             .unwrap()

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use frazil::geometry::{DVec3, TriMesh, Vec3};
 
-use crate::program::{fails, works};
+use crate::program::{Folder, fails, works};
 
 /// A position on a map; all coordinates of the tests are whole 1024ths, which 32 bits round there.
 const FAR: [f64; 3] = [652_301.375, 12.5, 5_182_300.25];
@@ -65,9 +65,9 @@ fn obj(mesh: &TriMesh, how: As) -> String {
 }
 
 /// A folder with the meshes and scenes; `origin` is the line of a key, or nothing.
-fn folder(how: As, origin: &str) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+fn folder(how: As, origin: &str) -> Folder {
+    let folder = Folder::empty();
+    let write = |name: &str, text: &str| fs::write(folder.join(name), text).unwrap();
     let mut open = block();
     open.triangles.pop();
     let mut moved = block();
@@ -202,8 +202,7 @@ fn coordinates_of_a_map_keep_their_digits_less_an_origin() {
 
 #[test]
 fn every_door_warns_of_what_lies_far_from_the_origin() {
-    let far = folder(As::Far, "");
-    let far = far.path();
+    let far = &folder(As::Far, "");
     for command in [
         "info hill.obj",
         "mesh check hill.obj",

@@ -9,7 +9,7 @@ use frazil::vdb::file::WriteOptions;
 use frazil::vdb::points;
 use frazil::{Context, Pool};
 
-use crate::program::{CUBE, fails, works};
+use crate::program::{CUBE, Folder, fails, works};
 
 /// A few grains, with a file of them.
 fn grains(folder: &Path, name: &str) -> Points {
@@ -32,12 +32,12 @@ fn grains(folder: &Path, name: &str) -> Points {
 
 #[test]
 fn info_lists_attributes_with_their_ranges() {
-    let folder = tempfile::tempdir().unwrap();
-    grains(folder.path(), "grains.vdb");
-    works(folder.path(), "convert grains.vdb grains.ply");
+    let folder = Folder::empty();
+    grains(&folder, "grains.vdb");
+    works(&folder, "convert grains.vdb grains.ply");
     for name in ["grains.vdb", "grains.ply"] {
         let said: serde_json::Value =
-            serde_json::from_str(&works(folder.path(), &format!("info {name} --json"))).unwrap();
+            serde_json::from_str(&works(&folder, &format!("info {name} --json"))).unwrap();
         let points = &said[0]["holds"][0];
         assert_eq!((&points["points"], &points["voxel_m"]), (&60.into(), &0.01.into()), "{said}");
         assert_eq!(points["attribute id"]["max"], 59);
@@ -50,34 +50,30 @@ fn info_lists_attributes_with_their_ranges() {
 
 #[test]
 fn convert_carries_every_attribute_through_ply() {
-    let folder = tempfile::tempdir().unwrap();
-    let given = grains(folder.path(), "a.vdb");
-    works(folder.path(), "convert a.vdb b.ply");
-    works(folder.path(), "convert b.ply c.vdb");
-    works(folder.path(), "convert b.ply d.ply");
-    let back = points::read_own(&folder.path().join("c.vdb"), Some("grains")).unwrap();
+    let folder = Folder::empty();
+    let given = grains(&folder, "a.vdb");
+    works(&folder, "convert a.vdb b.ply");
+    works(&folder, "convert b.ply c.vdb");
+    works(&folder, "convert b.ply d.ply");
+    let back = points::read_own(&folder.join("c.vdb"), Some("grains")).unwrap();
     assert_eq!(back.attributes, given.attributes);
     assert_eq!(back.voxel_size, 0.01);
     for n in 0..60 {
         assert!((back.position(n) - given.position(n)).norm() < 1e-7);
     }
-    assert_eq!(
-        fs::read(folder.path().join("b.ply")).unwrap(),
-        fs::read(folder.path().join("d.ply")).unwrap()
-    );
+    assert_eq!(fs::read(folder.join("b.ply")).unwrap(), fs::read(folder.join("d.ply")).unwrap());
     // Any program's vertices are points too.
     let plain = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n\
                  end_header\n0 0 0\n1 2 3\n";
-    fs::write(folder.path().join("plain.ply"), plain).unwrap();
-    fails(folder.path(), "convert plain.ply e.vdb", 2, &["plain.ply", "--voxel"]);
-    works(folder.path(), "convert plain.ply e.vdb --voxel 0.1");
-    assert_eq!(points::read_own(&folder.path().join("e.vdb"), None).unwrap().count(), 2);
+    fs::write(folder.join("plain.ply"), plain).unwrap();
+    fails(&folder, "convert plain.ply e.vdb", 2, &["plain.ply", "--voxel"]);
+    works(&folder, "convert plain.ply e.vdb --voxel 0.1");
+    assert_eq!(points::read_own(&folder.join("e.vdb"), None).unwrap().count(), 2);
 }
 
 #[test]
 fn particle_caches_are_listed_and_go_from_one_format_to_another() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     for frame in [1, 2] {
         grains(folder, &format!("g.{frame:04}.vdb"));
     }
@@ -108,8 +104,7 @@ fn particle_caches_are_listed_and_go_from_one_format_to_another() {
 
 #[test]
 fn points_of_another_unit_and_axis_are_turned_with_their_vectors() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let text = "# vtk DataFile Version 3.0\ncentimetres, z up\nASCII\nDATASET POLYDATA\nPOINTS 2 float\n100 200 300\n0 0 50\n\
                 POINT_DATA 2\nVECTORS velocity float\n10 20 30\n0 0 -981\nVECTORS colour float\n1 2 3\n1 2 4\n\
                 SCALARS pscale float\nLOOKUP_TABLE default\n2\n3\n";
@@ -138,12 +133,12 @@ fn points_of_another_unit_and_axis_are_turned_with_their_vectors() {
 
 #[test]
 fn convert_writes_points_of_usd() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     for frame in [4, 5] {
-        grains(folder.path(), &format!("g.{frame:04}.vdb"));
+        grains(&folder, &format!("g.{frame:04}.vdb"));
     }
-    works(folder.path(), "convert g.%04d.vdb out.%04d.usda --frames 4-5 --fps 25");
-    let text = fs::read_to_string(folder.path().join("out.0005.usda")).unwrap();
+    works(&folder, "convert g.%04d.vdb out.%04d.usda --frames 4-5 --fps 25");
+    let text = fs::read_to_string(folder.join("out.0005.usda")).unwrap();
     for line in [
         "def Points \"g\"",
         "timeCodesPerSecond = 25",
@@ -160,37 +155,32 @@ fn convert_writes_points_of_usd() {
 
 #[test]
 fn points_and_meshes_are_not_mixed_up() {
-    let folder = tempfile::tempdir().unwrap();
-    grains(folder.path(), "grains.vdb");
-    fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
-    works(folder.path(), "convert cube.obj cube.ply");
-    works(folder.path(), "convert cube.ply cube2.obj");
-    fails(folder.path(), "convert grains.vdb grains.obj", 2, &["grains.obj", ".usda"]);
-    fails(folder.path(), "convert cube.obj cube.vdb", 2, &["cube.obj", "points"]);
-    fails(folder.path(), "convert grains.vdb g.ply --to-scale 2", 2, &["--to-scale"]);
-    fails(folder.path(), "convert grains.vdb g.vtk", 2, &["g.vtk", ".bgeo"]);
-    fails(folder.path(), "convert grains.bgeo.sc g.vdb", 2, &["grains.bgeo.sc"]);
-    fails(folder.path(), "info none.bgeo", 2, &["none.bgeo"]);
-    fails(folder.path(), "convert cube.obj c.ply --voxel 1", 2, &["--voxel"]);
-    fails(folder.path(), "convert g.%04d.vdb g.ply", 2, &["--frames"]);
-    fails(folder.path(), "convert none.vdb g.ply", 2, &["none.vdb"]);
-    fails(folder.path(), "preview cube.obj -o p.png --color v", 2, &["--color"]);
-    fails(
-        folder.path(),
-        "preview grains.vdb -o p.png --color heat",
-        2,
-        &["grains.vdb", "heat", "source_frame"],
-    );
+    let folder = Folder::empty();
+    grains(&folder, "grains.vdb");
+    fs::write(folder.join("cube.obj"), CUBE).unwrap();
+    works(&folder, "convert cube.obj cube.ply");
+    works(&folder, "convert cube.ply cube2.obj");
+    fails(&folder, "convert grains.vdb grains.obj", 2, &["grains.obj", ".usda"]);
+    fails(&folder, "convert cube.obj cube.vdb", 2, &["cube.obj", "points"]);
+    fails(&folder, "convert grains.vdb g.ply --to-scale 2", 2, &["--to-scale"]);
+    fails(&folder, "convert grains.vdb g.vtk", 2, &["g.vtk", ".bgeo"]);
+    fails(&folder, "convert grains.bgeo.sc g.vdb", 2, &["grains.bgeo.sc"]);
+    fails(&folder, "info none.bgeo", 2, &["none.bgeo"]);
+    fails(&folder, "convert cube.obj c.ply --voxel 1", 2, &["--voxel"]);
+    fails(&folder, "convert g.%04d.vdb g.ply", 2, &["--frames"]);
+    fails(&folder, "convert none.vdb g.ply", 2, &["none.vdb"]);
+    fails(&folder, "preview cube.obj -o p.png --color v", 2, &["--color"]);
+    fails(&folder, "preview grains.vdb -o p.png --color heat", 2, &["grains.vdb", "heat", "source_frame"]);
 }
 
 #[test]
 fn preview_draws_points_beside_meshes_and_colours_them() {
-    let folder = tempfile::tempdir().unwrap();
-    grains(folder.path(), "grains.vdb");
-    fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
+    let folder = Folder::empty();
+    grains(&folder, "grains.vdb");
+    fs::write(folder.join("cube.obj"), CUBE).unwrap();
     let picture = |arguments: &str| {
-        works(folder.path(), &format!("preview {arguments} -o p.png --size 160x90"));
-        fs::read(folder.path().join("p.png")).unwrap()
+        works(&folder, &format!("preview {arguments} -o p.png --size 160x90"));
+        fs::read(folder.join("p.png")).unwrap()
     };
     let plain = picture("grains.vdb --threads 1");
     assert!(picture("grains.vdb --threads 2") == plain);

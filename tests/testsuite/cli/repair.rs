@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::hero;
-use crate::program::{CUBE, fails, works};
+use crate::program::{CUBE, Folder, fails, works};
 use frazil::geometry::mesh::attributes::{DetailedMesh, MeshArray, Number, On};
 use frazil::geometry::{TriMesh, Uvs, Vec3};
 use frazil::io::mesh;
@@ -63,8 +63,7 @@ fn number(report: &Value, key: &str) -> f64 {
 
 #[test]
 fn two_cubes_that_overlap_become_one_solid() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let (two, volume) = two_cubes(10);
     write(folder, "two.ply", &two);
     let said = works(folder, "mesh repair two.ply -o one.ply");
@@ -99,8 +98,7 @@ fn two_cubes_that_overlap_become_one_solid() {
 
 #[test]
 fn an_open_cube_is_closed_and_a_whole_one_written_as_it_is() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let mut open = TriMesh::cuboid([0.0; 3], [1.0; 3]);
     open.triangles.truncate(10);
     write(folder, "open.obj", &open);
@@ -126,8 +124,7 @@ fn an_open_cube_is_closed_and_a_whole_one_written_as_it_is() {
 
 #[test]
 fn soups_and_characters_become_solids() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let (two, volume) = two_cubes(6);
     let positions: Vec<Vec3> =
         two.triangles.as_flattened().iter().map(|&vertex| two.positions[vertex as usize]).collect();
@@ -186,8 +183,7 @@ fn by_positions(detail: &DetailedMesh) -> Vec<Placed> {
 
 #[test]
 fn what_is_not_rebuilt_keeps_its_arrays_bit_for_bit() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let (mesh, _) = two_cubes(10);
     let array = |name: &str, on: On, number: Number, values: Vec<f64>| MeshArray {
         name: name.into(),
@@ -231,8 +227,7 @@ fn what_is_not_rebuilt_keeps_its_arrays_bit_for_bit() {
 
 #[test]
 fn sequences_are_repaired_frame_by_frame() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     for (frame, size) in [(1, 1.0), (2, 2.0), (3, 0.5)] {
         let mut open = TriMesh::cuboid([0.0; 3], [size, 1.0, 1.0]);
         open.triangles.truncate(10);
@@ -255,8 +250,7 @@ fn sequences_are_repaired_frame_by_frame() {
 
 #[test]
 fn what_cannot_be_repaired_is_a_sentence() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     for name in ["cube.obj", "body.1.obj", "body.2.obj"] {
         fs::write(folder.join(name), CUBE).unwrap();
     }
@@ -290,10 +284,10 @@ fn what_cannot_be_repaired_is_a_sentence() {
 #[test]
 fn every_key_of_a_report_is_on_the_page() {
     const CLI: &str = include_str!("../../../docs/cli.md");
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("body.1.obj"), CUBE).unwrap();
+    let folder = Folder::empty();
+    fs::write(folder.join("body.1.obj"), CUBE).unwrap();
     let page = CLI.split("## Repaired meshes\n").nth(1).unwrap().split("\n## ").next().unwrap();
-    let report = repaired(folder.path(), "body.%d.obj -o out.%d.ply --frames 1");
+    let report = repaired(&folder, "body.%d.obj -o out.%d.ply --frames 1");
     let keys: Vec<&String> = report[0].as_object().unwrap().keys().collect();
     assert!(keys.len() > 18, "{keys:?}");
     let missing: Vec<_> = keys.into_iter().filter(|key| !page.contains(&format!("`{key}`"))).collect();

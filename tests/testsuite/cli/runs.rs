@@ -3,19 +3,18 @@
 use std::fs;
 use std::path::Path;
 
-use crate::program::{CUBE, frazil, works};
-use tempfile::TempDir;
+use crate::program::{CUBE, Folder, frazil, works};
 
 /// A folder with a cube that slides through snow for so many frames.
-fn folder(frames: u32, cell: f64, mesh: &str) -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("cube.obj"), mesh).unwrap();
+fn folder(frames: u32, cell: f64, mesh: &str) -> Folder {
+    let folder = Folder::empty();
+    fs::write(folder.join("cube.obj"), mesh).unwrap();
     let scene = format!(
         "[shot]\nframes = \"1-{frames}\"\n[snow]\nground = 0.0\narea = [-0.5, -0.5, 0.5, 1.5]\ndepth = 0.3\n\
          cell = {cell}\n[[object]]\nfile = \"cube.obj\"\nkeys = [{{ frame = 1, at = [0, 0.1, 0] }}, \
          {{ frame = {frames}, at = [0, 0.1, 0.9], turn_deg = [0, 40, 0] }}]\n"
     );
-    fs::write(folder.path().join("shot.toml"), scene).unwrap();
+    fs::write(folder.join("shot.toml"), scene).unwrap();
     folder
 }
 
@@ -28,31 +27,31 @@ fn removed(folder: &Path, frame: u32) -> f64 {
 #[test]
 fn a_scene_makes_frames_and_its_resolved_file_makes_them_again() {
     let folder = folder(3, 0.05, CUBE);
-    let said = works(folder.path(), "snow shot.toml -o out");
+    let said = works(&folder, "snow shot.toml -o out");
     assert!(said.contains("frame 3 stage base 100% eta 00:00:00"), "{said}");
-    assert!(removed(folder.path(), 1) > 0.4 * 0.4 * 0.2 * 0.8);
-    works(folder.path(), "snow out/scene.toml -o again -q --threads 1");
+    assert!(removed(&folder, 1) > 0.4 * 0.4 * 0.2 * 0.8);
+    works(&folder, "snow out/scene.toml -o again -q --threads 1");
     for name in ["base/base.0003.vdb", "removed/removed.0002.vdb", "scene.toml"] {
-        let [a, b] = ["out", "again"].map(|tree| fs::read(folder.path().join(tree).join(name)).unwrap());
+        let [a, b] = ["out", "again"].map(|tree| fs::read(folder.join(tree).join(name)).unwrap());
         assert!(a == b, "{name} differs");
     }
-    let json = works(folder.path(), "info out/base/base.0003.vdb --json --measure");
+    let json = works(&folder, "info out/base/base.0003.vdb --json --measure");
     let info: serde_json::Value = serde_json::from_str(&json).unwrap();
     let names: Vec<_> =
         info[0]["holds"].as_array().unwrap().iter().map(|grid| grid["name"].clone()).collect();
     assert_eq!(names, ["compression", "surface", "touched"]);
-    works(folder.path(), "preview out/base/base.0003.vdb cube.obj -o p.png --size 64x36");
-    assert!(folder.path().join("p.png").metadata().unwrap().len() > 500);
+    works(&folder, "preview out/base/base.0003.vdb cube.obj -o p.png --size 64x36");
+    assert!(folder.join("p.png").metadata().unwrap().len() > 500);
 }
 
 #[test]
 fn another_scene_does_not_mix_into_a_folder() {
     let folder = folder(2, 0.05, CUBE);
-    works(folder.path(), "snow shot.toml -o out -q");
-    works(folder.path(), "snow shot.toml -o out -q");
-    let scene = fs::read_to_string(folder.path().join("shot.toml")).unwrap();
-    fs::write(folder.path().join("shot.toml"), scene.replace("depth = 0.3", "depth = 0.2")).unwrap();
-    let output = frazil(folder.path(), "snow shot.toml -o out");
+    works(&folder, "snow shot.toml -o out -q");
+    works(&folder, "snow shot.toml -o out -q");
+    let scene = fs::read_to_string(folder.join("shot.toml")).unwrap();
+    fs::write(folder.join("shot.toml"), scene.replace("depth = 0.3", "depth = 0.2")).unwrap();
+    let output = frazil(&folder, "snow shot.toml -o out");
     assert_eq!(output.status.code(), Some(2));
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert!(stderr.contains("(snow.depth was 0.3)") && stderr.contains("another -o"), "{stderr}");
@@ -61,9 +60,9 @@ fn another_scene_does_not_mix_into_a_folder() {
 #[test]
 fn chosen_frames_are_written_as_in_a_whole_run() {
     let folder = folder(5, 0.05, CUBE);
-    works(folder.path(), "snow shot.toml -o whole -q");
-    works(folder.path(), "snow shot.toml -o out -q --frames 2-4x2");
-    let there = |tree: &str, frame: u32| folder.path().join(format!("{tree}/base/base.{frame:04}.vdb"));
+    works(&folder, "snow shot.toml -o whole -q");
+    works(&folder, "snow shot.toml -o out -q --frames 2-4x2");
+    let there = |tree: &str, frame: u32| folder.join(format!("{tree}/base/base.{frame:04}.vdb"));
     assert_eq!((1..=5).filter(|&frame| there("out", frame).exists()).collect::<Vec<_>>(), [2, 4]);
     assert!(fs::read(there("out", 4)).unwrap() == fs::read(there("whole", 4)).unwrap());
 }
@@ -71,11 +70,11 @@ fn chosen_frames_are_written_as_in_a_whole_run() {
 #[test]
 fn verbose_says_what_is_read_and_how_long_stages_take() {
     let folder = folder(2, 0.05, &CUBE.replacen("f 3 4 8 7\n", "", 1));
-    let said = works(folder.path(), "snow shot.toml -o out -v --max-memory 1G");
+    let said = works(&folder, "snow shot.toml -o out -v --max-memory 1G");
     for words in ["10 triangles, 1 open loops closed", "active voxels", "frame 2: ", "sweep", " ms"] {
         assert!(said.contains(words), "no {words:?} in {said}");
     }
-    let quiet = works(folder.path(), "snow shot.toml -o again --quiet");
+    let quiet = works(&folder, "snow shot.toml -o again --quiet");
     assert_eq!(quiet, "");
 }
 
@@ -90,8 +89,8 @@ fn open_non_manifold_and_distant_meshes_work() {
     works(folder_fin.path(), "snow shot.toml -o out -q");
     assert!(removed(folder_fin.path(), 1) > 0.02);
     let folder_far = folder(2, 0.05, CUBE);
-    let scene = fs::read_to_string(folder_far.path().join("shot.toml")).unwrap();
-    fs::write(folder_far.path().join("shot.toml"), scene.replace("at = [0,", "at = [50,")).unwrap();
+    let scene = fs::read_to_string(folder_far.join("shot.toml")).unwrap();
+    fs::write(folder_far.join("shot.toml"), scene.replace("at = [0,", "at = [50,")).unwrap();
     works(folder_far.path(), "snow shot.toml -o out -q");
     assert_eq!(removed(folder_far.path(), 2), 0.0);
 }
@@ -114,11 +113,10 @@ fn phases(path: &Path) -> std::collections::BTreeMap<String, (f64, Option<u64>)>
 #[test]
 fn the_report_of_a_run_sums_the_phases_of_its_frames() {
     let folder = folder(3, 0.05, CUBE);
-    works(folder.path(), "snow shot.toml -o out --report run.json");
-    let run = phases(&folder.path().join("run.json"));
-    let frames: Vec<_> = (1..=3)
-        .map(|frame| phases(&folder.path().join(format!("out/report/base.{frame:04}.json"))))
-        .collect();
+    works(&folder, "snow shot.toml -o out --report run.json");
+    let run = phases(&folder.join("run.json"));
+    let frames: Vec<_> =
+        (1..=3).map(|frame| phases(&folder.join(format!("out/report/base.{frame:04}.json")))).collect();
     for name in ["sweep", "distance", "noise", "subtract", "columns", "commit"] {
         let (seconds, count) = run[name];
         let sum: f64 = frames.iter().map(|frame| frame[name].0).sum();

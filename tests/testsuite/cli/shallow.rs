@@ -8,7 +8,7 @@ use frazil::io::mesh;
 use serde_json::Value;
 
 use crate::picture::Picture;
-use crate::program::{fails, frazil, works};
+use crate::program::{Folder, fails, frazil, works};
 
 const CLI: &str = include_str!("../../../docs/cli.md");
 
@@ -41,8 +41,7 @@ fn json(path: &Path) -> Value {
 
 #[test]
 fn the_page_of_the_command_line_spills() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_dish(folder);
     let section = CLI.split("## Spills\n").nth(1).unwrap().split("\n## ").next().unwrap();
     let block = |kind: &str| {
@@ -68,8 +67,7 @@ fn the_page_of_the_command_line_spills() {
 
 #[test]
 fn a_new_scene_runs_as_it_is() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_dish(folder);
     let scene =
         works(folder, "new shallow").replace("terrain.obj", "dish.obj").replace("\"1-120\"", "\"1-4\"");
@@ -85,8 +83,7 @@ fn a_new_scene_runs_as_it_is() {
 
 #[test]
 fn a_check_counts_cells_and_millilitres() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_scene(
         folder,
         &format!("border = \"closed\"\n{POUR}[[source]]\nat = [0, 0, 0]\nradius = 0\nrate_ml = 3\n"),
@@ -127,8 +124,7 @@ fn a_check_counts_cells_and_millilitres() {
 
 #[test]
 fn what_is_wrong_is_one_sentence_and_leaves_nothing_behind() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_scene(folder, POUR);
     let refused = |set: &str, words: &[&str]| {
         fails(folder, &format!("shallow spill.toml -o no {set}"), 2, words);
@@ -252,8 +248,7 @@ fn what_is_wrong_is_one_sentence_and_leaves_nothing_behind() {
 
 #[test]
 fn terrains_that_face_down_or_are_nothing_are_told() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_scene(folder, POUR);
     works(folder, "shallow spill.toml -o up");
     let dish = mesh::read(&folder.join("dish.obj")).unwrap();
@@ -271,8 +266,7 @@ fn terrains_that_face_down_or_are_nothing_are_told() {
 
 #[test]
 fn an_image_of_heights_is_a_terrain_with_its_size() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_scene(folder, POUR);
     // A slope, drawn by the program itself.
     let mut bytes = Vec::new();
@@ -300,8 +294,7 @@ fn an_image_of_heights_is_a_terrain_with_its_size() {
 
 #[test]
 fn a_picture_shows_the_ground_through_thin_liquid() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_scene(folder, POUR);
     works(folder, "shallow spill.toml -o thin --set shallow.opaque_depth=0.5");
     works(folder, "shallow spill.toml -o thick --set shallow.opaque_depth=0.0001");
@@ -338,8 +331,7 @@ fn a_picture_shows_the_ground_through_thin_liquid() {
 
 #[test]
 fn frames_without_liquid_are_drawn_too() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_scene(folder, "[[source]]\nat = [0, 0, 0]\nradius = 0.004\nrate_ml = 5\nfrom = 3\n");
     works(folder, "shallow spill.toml -o out");
     let reports = [1, 2, 3].map(|frame| json(&folder.join(format!("out/report/liquid.000{frame}.json"))));

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::common::bodies::Dice;
 use crate::common::soups::solids;
-use crate::program::{fails, frazil, works};
+use crate::program::{Folder, fails, frazil, works};
 use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::io::mesh;
 use serde_json::Value;
@@ -19,8 +19,7 @@ fn write(folder: &Path, name: &str, mesh: &TriMesh) {
 
 #[test]
 fn soup_that_is_off_by_rounding_is_a_solid_for_every_tool() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let mut dice = Dice(11);
     for solid in solids(&mut dice).into_iter().take(3) {
         let soup = solid.soup(1.0, DVec3::new(20.0, 0.0, -7.0), 4, &mut dice);
@@ -72,8 +71,7 @@ fn shreds(count: usize, dice: &mut Dice) -> TriMesh {
 
 #[test]
 fn a_repair_that_would_lose_nearly_all_fails() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let mut mesh = shreds(400, &mut Dice(2));
     mesh.append(&TriMesh::cuboid([0.0; 3], [0.3; 3]));
     write(folder, "shreds.ply", &mesh);
@@ -88,8 +86,7 @@ fn a_repair_that_would_lose_nearly_all_fails() {
 
 #[test]
 fn a_repair_that_loses_a_sheet_says_so() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let mut mesh = TriMesh::cuboid([0.0; 3], [1.0; 3]);
     let sheet = TriMesh {
         positions: [[0.0, 2.0, 0.0], [1.0, 2.0, 0.0], [1.0, 2.0, 1.0], [0.0, 2.0, 1.0]]

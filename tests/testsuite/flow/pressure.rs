@@ -5,10 +5,7 @@ use frazil::flow::{Coord, Faces, Flow, Solids, Tiles};
 use frazil::{Context, Pool};
 
 use super::fields::{box_of, random_velocity};
-
-fn context() -> Context {
-    Context::new(Pool::new(2).unwrap())
-}
+use crate::common::liquids::context;
 
 fn open(tiles: &Tiles, _: f32) -> frazil::Result<Solids> {
     Ok(Solids::none(tiles))
@@ -20,7 +17,7 @@ fn greatest(field: &[[f32; 512]]) -> f32 {
 
 #[test]
 fn a_random_velocity_becomes_free_of_divergence() {
-    let ctx = context();
+    let ctx = context(2);
     let mut tiles: Vec<Coord> = box_of([-1, 0, 0], [4, 2, 3]);
     tiles.extend([[9, 0, 0], [9, 0, 1]]);
     tiles.sort_unstable();
@@ -36,7 +33,7 @@ fn a_random_velocity_becomes_free_of_divergence() {
 
 #[test]
 fn a_ball_that_moves_carries_the_air_around_it() {
-    let ctx = context();
+    let ctx = context(2);
     let mut flow = Flow::new(0.1, [0.0; 3]).unwrap();
     flow.resize(&padded(&[[0, 0, 0]], 2));
     let boundary = |tiles: &Tiles, cell: f32| Ok(ball(tiles, cell, 9.0, [1.0, 0.0, 0.0]));
@@ -57,7 +54,7 @@ fn a_ball_that_moves_carries_the_air_around_it() {
 
 #[test]
 fn solids_that_move_into_each_other_leave_the_air_around_them_solvable() {
-    let ctx = context();
+    let ctx = context(2);
     let mut flow = Flow::new(0.1, [0.0; 3]).unwrap();
     flow.resize(&padded(&[[0, 0, 0]], 2));
     // One half of a ball moves into the other, which stands still: inside, faces of one cell move at two speeds.
@@ -121,7 +118,7 @@ fn ball(tiles: &Tiles, cell: f32, radius: f32, speed: [f32; 3]) -> Solids {
 
 #[test]
 fn a_sealed_pocket_that_shrinks_is_solved() {
-    let ctx = context();
+    let ctx = context(2);
     let mut flow = Flow::new(0.1, [0.0; 3]).unwrap();
     flow.resize(&padded(&[[0, 0, 0]], 1));
     random_velocity(&mut flow);

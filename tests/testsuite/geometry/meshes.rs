@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use std::path::PathBuf;
 
 use crate::common::shapes;
+use crate::program::Folder;
 use frazil::geometry::spatial::bvh::Bvh;
 use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::io::files::sequence::Pattern;
@@ -132,9 +133,9 @@ fn rigid_keys_move_on_arcs_and_compose() {
 }
 
 /// Frames 1 to 3 of a box that moves 0, 1, 4 m up.
-fn sequence() -> (tempfile::TempDir, Pattern) {
-    let folder = tempfile::tempdir().unwrap();
-    let pattern = Pattern::parse(&folder.path().join("b.%04d.ply")).unwrap();
+fn sequence() -> (Folder, Pattern) {
+    let folder = Folder::empty();
+    let pattern = Pattern::parse(&folder.join("b.%04d.ply")).unwrap();
     for (frame, y) in [(1, 0.0), (2, 1.0), (3, 4.0)] {
         let mut cube = shapes::cuboid([1.0; 3]);
         cube.positions.iter_mut().for_each(|p| p.y += y);

@@ -73,7 +73,9 @@ fn the_names_in_the_code_are_declared() {
     }
     for path in files {
         let text = fs::read_to_string(&path).unwrap();
-        for (call, is_whole) in [("gate", true), ("holds", true), ("skipped", false), ("wants", false)] {
+        for (call, is_whole) in
+            [("measure", true), ("gate", true), ("holds", true), ("skipped", false), ("wants", false)]
+        {
             for rest in text.split(&format!("h.{call}(")).skip(1) {
                 // Names that are put together are looked up when they are measured.
                 let Some(name) = rest.trim_start().strip_prefix('"') else { continue };

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The programs that link crate vdb-rs, and what they include.
-const APART: [&str; 3] = ["benches/reader.rs", "tests/common/program.rs", "tests/readers.rs"];
+const APART: [&str; 2] = ["tests/common/program.rs", "tests/readers.rs"];
 
 /// Every Rust file below a folder of the crate, from the crate's root.
 fn sources(folder: &str) -> Vec<PathBuf> {

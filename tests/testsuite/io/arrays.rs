@@ -5,7 +5,7 @@ use std::fs;
 
 use crate::common::clients;
 use crate::common::usda::numbers;
-use crate::program::works;
+use crate::program::{Folder, works};
 use serde_json::{Value, json};
 
 /// A square with arrays of its vertices, of itself and of its corners.
@@ -46,8 +46,7 @@ fn flat(value: &Value) -> Vec<f32> {
 
 #[test]
 fn convert_writes_the_arrays_of_a_mesh_as_primvars() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     fs::write(folder.join("rich.ply"), RICH).unwrap();
     assert_eq!(works(folder, "convert rich.ply rich.usda"), "");
     let text = fs::read_to_string(folder.join("rich.usda")).unwrap();
@@ -79,8 +78,7 @@ fn convert_writes_the_arrays_of_a_mesh_as_primvars() {
 
 #[test]
 fn an_obj_with_colours_has_them_in_usd() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     fs::write(folder.join("tint.obj"), "v 0 0 0 1 .5 0\nv 1 0 0 0 1 0\nv 0 1 0 .25 0 1\nf 1 2 3\n").unwrap();
     assert_eq!(works(folder, "convert tint.obj tint.usda"), "");
     let text = fs::read_to_string(folder.join("tint.usda")).unwrap();

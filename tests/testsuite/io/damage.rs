@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use crate::common::character;
 use crate::common::shapes;
-use crate::program::{self, CUBE, complains, fails, frazil, works};
+use crate::program::{self, CUBE, Folder, complains, fails, frazil, works};
 use frazil::numeric::blocks::{Block, BlockEdit};
 use frazil::vdb::file::{Compression, WriteOptions};
 use frazil::vdb::reading::guard::Guard;
@@ -48,7 +48,7 @@ fn ball(ctx: &Context) -> FloatGrid {
 
 #[test]
 fn known_breakers_of_openvdb_are_refused_in_a_sentence() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let names = [
         "trunc_base_1800",
         "trunc_blosc_800",
@@ -67,7 +67,7 @@ fn known_breakers_of_openvdb_are_refused_in_a_sentence() {
         let Some(path) = outside(&format!("broken/{name}.vdb")) else { return };
         for (command, after) in [("info --measure", ""), ("vdb to-mesh", "-o out.obj")] {
             let start = Instant::now();
-            let output = on(folder.path(), command, &path, after);
+            let output = on(&folder, command, &path, after);
             assert!(start.elapsed() < Duration::from_secs(30), "{name}: {:?}", start.elapsed());
             // Damage of what a command does not read is not seen by it.
             if !output.status.success() {
@@ -89,13 +89,13 @@ fn known_breakers_of_openvdb_are_refused_in_a_sentence() {
 
 #[test]
 fn known_breakers_of_other_readers_are_refused_in_a_sentence() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     for (name, code) in
         [("min_ply_hang.ply", 0), ("min_ply_memory.ply", 0), ("glb_620.glb", 2), ("gltf_798.gltf", 2)]
     {
         let Some(path) = outside(&format!("broken/{name}")) else { return };
         let start = Instant::now();
-        let output = on(folder.path(), "info", &path, "");
+        let output = on(&folder, "info", &path, "");
         assert!(start.elapsed() < Duration::from_secs(5), "{name}");
         match code {
             0 => assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr)),
@@ -103,7 +103,7 @@ fn known_breakers_of_other_readers_are_refused_in_a_sentence() {
         }
     }
     let Some(path) = outside("broken/min_obj_escape.obj") else { return };
-    let output = on(folder.path(), "info", &path, "");
+    let output = on(&folder, "info", &path, "");
     complains(&output, 2, &["line 4", "[31mX"]);
     assert!(!output.stderr.contains(&0x1b), "{:?}", output.stderr);
 }
@@ -129,8 +129,8 @@ fn intact_files_pass_and_every_cut_is_refused_before_openvdb_sees_it() {
 #[test]
 fn what_a_child_hands_over_is_what_the_file_holds() {
     let ctx = Context::new(Pool::new(2).unwrap());
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("ball.vdb");
+    let folder = Folder::empty();
+    let path = folder.join("ball.vdb");
     let mut flat = FloatGrid::new(0.25, 7.0).unwrap();
     flat.set_name("flat").unwrap();
     for compression in [Compression::None, Compression::Zip, Compression::Blosc] {
@@ -161,8 +161,8 @@ fn same(path: &Path, names: &[&str]) {
 #[test]
 fn a_program_that_is_not_frazil_is_named() {
     let ctx = Context::new(Pool::new(1).unwrap());
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("ball.vdb");
+    let folder = Folder::empty();
+    let path = folder.join("ball.vdb");
     file::write(&path, &[&ball(&ctx)], &WriteOptions::default()).unwrap();
     for (program, word) in [("/bin/true", "/bin/true"), ("/no/such/program", "cannot start")] {
         let guard = Guard { program: program.into(), ..guard() };
@@ -174,8 +174,8 @@ fn a_program_that_is_not_frazil_is_named() {
 #[test]
 fn a_file_that_needs_more_memory_than_it_may_is_refused() {
     let ctx = Context::new(Pool::new(1).unwrap());
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("large.vdb");
+    let folder = Folder::empty();
+    let path = folder.join("large.vdb");
     let mut grid = FloatGrid::new(0.1, 0.0).unwrap();
     let block =
         |i: i32| Block { origin: [i % 400 * 8, i / 400 * 8, 0], values: Box::new([1.5; 512]), mask: [1; 8] };
@@ -190,8 +190,8 @@ fn a_file_that_needs_more_memory_than_it_may_is_refused() {
 #[test]
 fn a_stream_without_offsets_is_read_and_its_end_is_noticed() {
     let ctx = Context::new(Pool::new(1).unwrap());
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("stream.vdb");
+    let folder = Folder::empty();
+    let path = folder.join("stream.vdb");
     let mut bytes = file::to_bytes(&[&ball(&ctx)], &WriteOptions::default()).unwrap();
     // The flag that says that offsets are there.
     bytes[20] = 0;
@@ -209,13 +209,13 @@ fn a_stream_without_offsets_is_read_and_its_end_is_noticed() {
 
 #[test]
 fn only_regular_files_are_read() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     for name in ["pipe.obj", "pipe.ply", "pipe.stl", "pipe.vdb", "pipe.glb"] {
-        assert!(Command::new("mkfifo").arg(folder.path().join(name)).status().unwrap().success());
-        fails(folder.path(), &format!("info {name}"), 2, &[name, "pipe"]);
+        assert!(Command::new("mkfifo").arg(folder.join(name)).status().unwrap().success());
+        fails(&folder, &format!("info {name}"), 2, &[name, "pipe"]);
     }
-    fs::create_dir(folder.path().join("folder.obj")).unwrap();
-    fails(folder.path(), "info folder.obj", 2, &["folder.obj", "is a folder"]);
+    fs::create_dir(folder.join("folder.obj")).unwrap();
+    fails(&folder, "info folder.obj", 2, &["folder.obj", "is a folder"]);
 }
 
 /// A model of one triangle whose buffer is a file.
@@ -230,19 +230,19 @@ fn model(uri: &str) -> String {
 
 #[test]
 fn a_model_names_no_file_outside_its_folder() {
-    let folder = tempfile::tempdir().unwrap();
-    let inner = folder.path().join("in");
+    let folder = Folder::empty();
+    let inner = folder.join("in");
     fs::create_dir_all(inner.join("below")).unwrap();
     let triangle: Vec<u8> =
         [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].iter().flat_map(|v| v.to_le_bytes()).collect();
     for position in ["secret.bin", "in/own data.bin", "in/below/more.bin"] {
-        fs::write(folder.path().join(position), &triangle).unwrap();
+        fs::write(folder.join(position), &triangle).unwrap();
     }
-    let secret = folder.path().join("secret.bin");
+    let secret = folder.join("secret.bin");
     let secret = secret.display();
     for uri in ["own%20data.bin", "below/more.bin", "./below/more.bin"] {
         fs::write(inner.join("model.gltf"), model(uri)).unwrap();
-        works(folder.path(), "info in/model.gltf");
+        works(&folder, "info in/model.gltf");
     }
     let outward = [
         "../secret.bin".to_string(),
@@ -258,22 +258,22 @@ fn a_model_names_no_file_outside_its_folder() {
     ];
     for uri in outward {
         fs::write(inner.join("model.gltf"), model(&uri)).unwrap();
-        fails(folder.path(), "info in/model.gltf", 2, &["model.gltf", "buffer"]);
+        fails(&folder, "info in/model.gltf", 2, &["model.gltf", "buffer"]);
     }
     for uri in ["%FF.bin", "%2", "none.bin", "a%00b.bin"] {
         fs::write(inner.join("model.gltf"), model(uri)).unwrap();
-        fails(folder.path(), "info in/model.gltf", 2, &["model.gltf", "buffer"]);
+        fails(&folder, "info in/model.gltf", 2, &["model.gltf", "buffer"]);
     }
     assert!(Command::new("mkfifo").arg(inner.join("pipe.bin")).status().unwrap().success());
     fs::write(inner.join("model.gltf"), model("pipe.bin")).unwrap();
-    fails(folder.path(), "info in/model.gltf", 2, &["model.gltf", "pipe.bin"]);
+    fails(&folder, "info in/model.gltf", 2, &["model.gltf", "pipe.bin"]);
 }
 
 #[test]
 fn numbers_without_data_take_no_memory() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let data: Vec<u8> = vec![0; 36];
-    fs::write(folder.path().join("a.bin"), data).unwrap();
+    fs::write(folder.join("a.bin"), data).unwrap();
     let sparse =
         r#""sparse":{"count":1,"indices":{"bufferView":0,"componentType":5125},"values":{"bufferView":0}},"#;
     let without_view =
@@ -282,23 +282,23 @@ fn numbers_without_data_take_no_memory() {
         .replace("\"byteLength\":36}],\"buffers\"", "\"byteLength\":36,\"byteStride\":4}],\"buffers\"")
         .replace("\"count\":3", "\"count\":7");
     for text in [without_view, one_on_another] {
-        fs::write(folder.path().join("model.gltf"), text).unwrap();
+        fs::write(folder.join("model.gltf"), text).unwrap();
         let start = Instant::now();
-        fails(folder.path(), "info model.gltf", 2, &["model.gltf", "accessor"]);
+        fails(&folder, "info model.gltf", 2, &["model.gltf", "accessor"]);
         assert!(start.elapsed() < Duration::from_secs(2), "{:?}", start.elapsed());
     }
     let animated = model("a.bin").replace(
         "\"accessors\"",
         "\"animations\":[{\"channels\":[{\"sampler\":3,\"target\":{\"node\":0,\"path\":\"rotation\"}}],\"samplers\":[]}],\"accessors\"",
     );
-    fs::write(folder.path().join("model.gltf"), animated).unwrap();
-    fails(folder.path(), "info model.gltf", 2, &["model.gltf", "sampler"]);
+    fs::write(folder.join("model.gltf"), animated).unwrap();
+    fails(&folder, "info model.gltf", 2, &["model.gltf", "sampler"]);
 }
 
 #[test]
 fn an_obj_may_begin_with_a_byte_order_mark_and_be_of_another_encoding() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("cube.obj");
+    let folder = Folder::empty();
+    let path = folder.join("cube.obj");
     fs::write(&path, CUBE).unwrap();
     let plain = io::mesh::read(&path).unwrap();
     let mut text = b"\xef\xbb\xbf".to_vec();
@@ -313,24 +313,24 @@ fn an_obj_may_begin_with_a_byte_order_mark_and_be_of_another_encoding() {
 
 #[test]
 fn convert_says_what_it_drops() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let text = format!("mtllib a.mtl\nvt 0 0\nvn 0 1 0\nusemtl paint\n{CUBE}");
-    fs::write(folder.path().join("cube.obj"), text).unwrap();
-    let said = works(folder.path(), "convert cube.obj out.ply");
+    fs::write(folder.join("cube.obj"), text).unwrap();
+    let said = works(&folder, "convert cube.obj out.ply");
     assert!(said.contains("cube.obj: UVs, normals and materials are not carried over"), "{said}");
-    let said = works(folder.path(), "convert out.ply again.obj");
+    let said = works(&folder, "convert out.ply again.obj");
     assert!(!said.contains("carried"), "{said}");
 }
 
 #[test]
 fn an_argument_that_is_not_text_does_not_panic() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let name = std::ffi::OsStr::from_bytes(b"caf\xe9.obj");
-    fs::write(folder.path().join(name), CUBE).unwrap();
-    let mut command = program::command(folder.path(), "--report report.json info");
+    fs::write(folder.join(name), CUBE).unwrap();
+    let mut command = program::command(&folder, "--report report.json info");
     let output = command.arg(name).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let mut command = program::command(folder.path(), "snow -o");
+    let mut command = program::command(&folder, "snow -o");
     complains(
         &command.arg(std::ffi::OsStr::from_bytes(b"\xff")).arg("none.toml").output().unwrap(),
         2,
@@ -341,11 +341,11 @@ fn an_argument_that_is_not_text_does_not_panic() {
 #[test]
 fn names_out_of_files_do_not_command_a_terminal() {
     let ctx = Context::new(Pool::new(1).unwrap());
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let mut grid = ball(&ctx);
     grid.set_name("red\u{1b}[31m\u{9b}5m\u{202e}").unwrap();
     grid.set_metadata("who\u{7}", MetaValue::Text("a\u{1b}]0;title\u{7}\nb".into())).unwrap();
-    file::write(&folder.path().join("a.vdb"), &[&grid], &WriteOptions::default()).unwrap();
+    file::write(&folder.join("a.vdb"), &[&grid], &WriteOptions::default()).unwrap();
     let clean = |bytes: &[u8]| {
         let text = String::from_utf8_lossy(bytes).into_owned();
         assert!(
@@ -353,10 +353,10 @@ fn names_out_of_files_do_not_command_a_terminal() {
             "{text:?}"
         );
     };
-    let output = frazil(folder.path(), "info a.vdb");
+    let output = frazil(&folder, "info a.vdb");
     clean(&output.stdout);
     assert!(output.status.success());
-    let output = frazil(folder.path(), "vdb smooth a.vdb --grid none -o b.vdb");
+    let output = frazil(&folder, "vdb smooth a.vdb --grid none -o b.vdb");
     clean(&output.stderr);
     assert!(!output.status.success());
 }

@@ -3,15 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use crate::common::shapes::{blob, cuboid};
+use crate::program::Folder;
 use frazil::geometry::{TriMesh, Vec3};
 use frazil::io::files::atomic;
 use frazil::io::mesh;
 use proptest::prelude::*;
 
 /// Writes `content` to `name` in a fresh folder.
-fn file(name: &str, content: &[u8]) -> (tempfile::TempDir, PathBuf) {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join(name);
+fn file(name: &str, content: &[u8]) -> (Folder, PathBuf) {
+    let folder = Folder::empty();
+    let path = folder.join(name);
     std::fs::write(&path, content).unwrap();
     (folder, path)
 }
@@ -183,10 +184,10 @@ fn a_write_that_fails_leaves_the_old_file_and_nothing_else() {
     let error = atomic::write(&path, |out| out.write_all(b"half").and(Err(full()))).unwrap_err();
     assert!(matches!(&error, frazil::Error::Io { path: at, .. } if *at == path), "{error}");
     assert_eq!(std::fs::read(&path).unwrap(), b"old");
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 1);
     atomic::write_bytes(&path, b"new").unwrap();
     assert_eq!(std::fs::read(&path).unwrap(), b"new");
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 1);
 }
 
 proptest! {
@@ -199,9 +200,9 @@ proptest! {
         // Neither in the order of their use, nor all of them used.
         let triangles = (1..count).rev().map(|i| [i, i - 1, (i + 1) % count]).filter(|t| !t.contains(&1) || count == 3).collect();
         let mesh = TriMesh { positions: seed.into_iter().map(Vec3::from).collect(), triangles };
-        let folder = tempfile::tempdir().unwrap();
+        let folder = Folder::empty();
         for name in ["a.ply", "a.obj"] {
-            let path = folder.path().join(name);
+            let path = folder.join(name);
             mesh::write(&path, &mesh).unwrap();
             let read = mesh::read(&path).unwrap();
             prop_assert_eq!(&read.triangles, &mesh.triangles);
@@ -214,9 +215,9 @@ proptest! {
     /// No bytes make a reader panic.
     #[test]
     fn damaged_files_never_panic(at in 0usize..2000, byte: u8) {
-        let folder = tempfile::tempdir().unwrap();
+        let folder = Folder::empty();
         for name in ["b.ply", "b.obj"] {
-            let path = folder.path().join(name);
+            let path = folder.join(name);
             mesh::write(&path, &blob(1.0, 2)).unwrap();
             let mut bytes = std::fs::read(&path).unwrap();
             let length = bytes.len();

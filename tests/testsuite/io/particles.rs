@@ -8,6 +8,7 @@ use frazil::geometry::points::{Column, Points, Values};
 use frazil::io::particles::{self, ParticleData};
 
 use crate::common::caches::{IDS, KINDS, POSITIONS, VELOCITIES, Vtu, bgeo, vtk, zipped};
+use crate::program::Folder;
 
 pub fn parse(name: &str, bytes: &[u8]) -> frazil::Result<ParticleData> {
     particles::parse(Path::new(name), bytes)
@@ -144,7 +145,7 @@ fn xyz_is_text_or_binary_and_never_both() {
 
 #[test]
 fn points_pass_through_the_files_that_are_written() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let mut points =
         Points::at(1.0, &POSITIONS.map(|position| DVec3::from(position.map(f64::from)))).unwrap();
     points.set("v", Values::Vector(Column::Each(VELOCITIES.to_vec())));
@@ -154,7 +155,7 @@ fn points_pass_through_the_files_that_are_written() {
     points.set("source_frame", Values::Int(Column::Each(vec![-1, 2, 3, 4])));
     let none = Points { voxel_size: 1.0, ..Points::default() };
     for name in ["a.bgeo", "a.bgeo.gz", "a.ply", "a.xyz"] {
-        let path = folder.path().join(name);
+        let path = folder.join(name);
         particles::write(&path, &none, true).unwrap();
         assert!(particles::read(&path).unwrap().positions.is_empty(), "{name}");
         particles::write(&path, &points, false).unwrap();
@@ -164,13 +165,13 @@ fn points_pass_through_the_files_that_are_written() {
         assert_eq!((&back.cells, &back.offsets), (&points.cells, &points.offsets), "{name}");
         assert!(back.attributes == points.attributes || name == "a.xyz", "{name}");
     }
-    let same = fs::read(folder.path().join("a.bgeo")).unwrap();
-    assert!(same == fs::read(folder.path().join("a.bgeo.gz")).unwrap());
+    let same = fs::read(folder.join("a.bgeo")).unwrap();
+    assert!(same == fs::read(folder.join("a.bgeo.gz")).unwrap());
     points.set("id", Values::Long(Column::Uniform(1 << 31)));
-    let error = particles::write(&folder.path().join("b.bgeo"), &points, true).unwrap_err().to_string();
+    let error = particles::write(&folder.join("b.bgeo"), &points, true).unwrap_err().to_string();
     assert!(
-        error.contains("b.bgeo") && error.contains("\"id\"") && !folder.path().join("b.bgeo").exists(),
+        error.contains("b.bgeo") && error.contains("\"id\"") && !folder.join("b.bgeo").exists(),
         "{error}"
     );
-    assert!(particles::write(&folder.path().join("b.vtk"), &points, true).is_err());
+    assert!(particles::write(&folder.join("b.vtk"), &points, true).is_err());
 }

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use crate::program::Folder;
 use frazil::geometry::{DVec3, PolygonMesh, TriMesh, Vec3};
 use frazil::io::{mesh, particles};
 use proptest::prelude::*;
@@ -224,8 +225,8 @@ proptest! {
 
     #[test]
     fn every_variant_of_a_text_holds_the_same_mesh(style in styles(), mesh in meshes()) {
-        let folder = tempfile::tempdir().unwrap();
-        let binary = folder.path().join("a.stl");
+        let folder = Folder::empty();
+        let binary = folder.join("a.stl");
         mesh::write(&binary, &mesh).unwrap();
         let text = style.stl(&mesh);
         let found = read("b.stl", &text);

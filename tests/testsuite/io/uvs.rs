@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::usda::numbers;
-use crate::program::works;
+use crate::program::{Folder, works};
 use frazil::geometry::PolygonMesh;
 use frazil::io::mesh;
 
@@ -109,8 +109,7 @@ fn base(folder: &Path, out: &str) -> Vec<Vec<u8>> {
 
 #[test]
 fn an_obj_with_seams_keeps_every_vertex_and_corner() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     fs::write(folder.join("seams.obj"), SEAMS).unwrap();
     // What the file's own lines say, without a reader of ours.
     let floats = |word: &str| -> Vec<Vec<f32>> {
@@ -146,8 +145,7 @@ fn an_obj_with_seams_keeps_every_vertex_and_corner() {
 
 #[test]
 fn a_seam_opens_nothing_and_a_vertex_without_a_face_sweeps_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let lines = SEAMS.lines().filter(|line| !line.starts_with("vt"));
     let plain: String = lines.map(|line| format!("{line}\n")).collect();
     let plain = with_faces(&plain, |vertex, _| format!(" {vertex}"));
@@ -196,8 +194,7 @@ fn with_faces(text: &str, corner: impl Fn(usize, &str) -> String) -> String {
 
 #[test]
 fn plys_keep_the_uvs_of_their_vertices_and_of_their_faces() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let head = |names: &str, list: &str| {
         format!(
             "ply\nformat ascii 1.0\nelement vertex 5\nproperty float {}\nproperty float x\nproperty float y\n\
@@ -285,8 +282,7 @@ fn gltf(folder: &Path) -> (Places, TextureCoordinates, Vec<[usize; 3]>) {
 
 #[test]
 fn a_gltf_keeps_its_vertices_though_those_that_move_alike_are_joined() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let (positions, uvs, triangles) = gltf(folder);
     // v points down in glTF.
     let corner = |i: usize| (positions[i], [uvs[i][0], 1.0 - uvs[i][1]]);
@@ -305,8 +301,7 @@ fn a_gltf_keeps_its_vertices_though_those_that_move_alike_are_joined() {
 
 #[test]
 fn corners_without_uvs_are_reported_and_bad_ones_are_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     fs::write(folder.join("part.obj"), SEAMS.replace("f 6/5/ 9/6 5/7", "f 6 9//1 5/7")).unwrap();
     let said = works(folder, "convert part.obj out.obj");
     assert!(said.contains("part.obj: 2 corners or vertices have no UVs"), "{said}");

@@ -12,9 +12,9 @@ use frazil::motion::{Character, Key, Keys, Motion, Placed, Play, Space};
 use frazil::sweep::Body;
 use proptest::prelude::*;
 use serde_json::json;
-use tempfile::TempDir;
 
 use crate::common::gltf_maker::Maker;
+use crate::program::Folder;
 
 fn open(path: &Path) -> Character {
     Character::open(path, Play { repeat: false, ..Play::default() }).unwrap()
@@ -33,7 +33,7 @@ fn close(a: DVec3, b: [f64; 3]) {
 
 #[test]
 fn step_linear_and_cubic_keys_follow_their_formulas() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let times = [1.0, 2.0, 4.0];
     let flat = |x: [f32; 3]| x.iter().flat_map(|x| [*x, 0.0, 0.0]).collect::<Vec<f32>>();
     // In-tangent, value, out-tangent of each key: x = t^3 on all of them.
@@ -59,7 +59,7 @@ fn step_linear_and_cubic_keys_follow_their_formulas() {
 
 #[test]
 fn rotations_take_the_shorter_way_and_nodes_carry_their_children() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let mut maker = Maker::new();
     let mesh = maker.triangle();
     maker.push("nodes", json!({ "children": [1], "translation": [0, 0, 2], "scale": [2, 2, 2] }));
@@ -78,7 +78,7 @@ fn rotations_take_the_shorter_way_and_nodes_carry_their_children() {
 
 #[test]
 fn morph_targets_add_their_parts() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let mut maker = Maker::new();
     let positions = maker.floats("VEC3", 3, &[0., 0., 0., 1., 0., 0., 0., 1., 0.]);
     let up = maker.floats("VEC3", 3, &[0., 0., 4., 0., 0., 0., 0., 0., 0.]);
@@ -128,7 +128,7 @@ fn strip(weights_differ: bool) -> Maker {
 
 #[test]
 fn skins_share_their_joints_and_equal_vertices_are_welded() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let whole = open(&strip(false).write(&folder));
     assert_eq!(whole.vertex_count(), 4);
     close(pose(&whole, 1.0)[0], [2.0, 0.0, 9.0]);
@@ -141,7 +141,7 @@ fn skins_share_their_joints_and_equal_vertices_are_welded() {
 
 #[test]
 fn clips_start_where_they_are_asked_to_and_repeat() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let mut maker = Maker::new();
     let mesh = maker.triangle();
     maker.push("nodes", json!({ "mesh": mesh }));
@@ -163,7 +163,7 @@ fn clips_start_where_they_are_asked_to_and_repeat() {
 
 #[test]
 fn a_round_that_does_not_close_says_so_and_jumps_at_once() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let mut maker = Maker::new();
     let mesh = maker.triangle();
     maker.push("nodes", json!({ "mesh": mesh }));
@@ -178,7 +178,7 @@ fn a_round_that_does_not_close_says_so_and_jumps_at_once() {
 
 #[test]
 fn mirrored_nodes_keep_their_outside_outside() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let mut maker = Maker::new();
     let mesh = maker.triangle();
     maker.push("nodes", json!({ "mesh": mesh, "scale": [-1, 1, 1] }));
@@ -187,7 +187,7 @@ fn mirrored_nodes_keep_their_outside_outside() {
 
 #[test]
 fn nodes_and_clips_that_do_not_exist_are_answered_with_those_that_do() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let mut maker = strip(false);
     maker.clip("run");
     let path = maker.write(&folder);
@@ -209,9 +209,9 @@ fn nodes_and_clips_that_do_not_exist_are_answered_with_those_that_do() {
 
 #[test]
 fn damaged_files_are_refused_with_their_name() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let whole = strip(false).glb();
-    let path = folder.path().join("cut.glb");
+    let path = folder.join("cut.glb");
     for length in 0..whole.len() {
         fs::write(&path, &whole[..length]).unwrap();
         let error = Character::open(&path, Play::default()).err().unwrap().to_string();
@@ -222,11 +222,11 @@ fn damaged_files_are_refused_with_their_name() {
     for list in ["skins", "animations"] {
         assert!(!json[list].as_array().unwrap().is_empty());
     }
-    let gltf = folder.path().join("hero.gltf");
+    let gltf = folder.join("hero.gltf");
     fs::write(&gltf, json.to_string()).unwrap();
     let error = Character::open(&gltf, Play::default()).err().unwrap().to_string();
     assert!(error.contains("hero.gltf") && error.contains("arms.bin"), "{error}");
-    fs::write(folder.path().join("arms.bin"), [0; 100]).unwrap();
+    fs::write(folder.join("arms.bin"), [0; 100]).unwrap();
     let error = Character::open(&gltf, Play::default()).err().unwrap().to_string();
     assert!(error.contains("100 bytes, not 400"), "{error}");
     for (list, key, value) in [
@@ -253,14 +253,14 @@ proptest! {
 
     #[test]
     fn flipped_bytes_never_stop_the_program(at in prop::collection::vec((0usize..6000, any::<u8>()), 1..6)) {
-        thread_local!(static FILE: (TempDir, Vec<u8>) = (tempfile::tempdir().unwrap(), strip(true).glb()));
+        thread_local!(static FILE: (Folder, Vec<u8>) = (Folder::empty(), strip(true).glb()));
         FILE.with(|(folder, whole)| {
             let mut bytes = whole.clone();
             for (position, value) in at {
                 let position = position % bytes.len();
                 bytes[position] = value;
             }
-            let path = folder.path().join("flipped.glb");
+            let path = folder.join("flipped.glb");
             fs::write(&path, &bytes).unwrap();
             if let Ok(character) = Character::open(&path, Play::default()) {
                 pose(&character, 0.3);
@@ -271,8 +271,8 @@ proptest! {
 
 #[test]
 fn the_foot_that_stands_does_not_slip_when_keys_carry_the_figure_at_its_speed() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("hero.glb");
+    let folder = Folder::empty();
+    let path = folder.join("hero.glb");
     fs::write(&path, hero::glb()).unwrap();
     let play = Play { clip: Some("walk".into()), ..Play::default() };
     let inner = Character::open(&path, play).unwrap();

@@ -9,11 +9,12 @@ use serde_json::json;
 
 use crate::common::gltf_maker::Maker;
 use crate::common::gltf_variants::{Geometry, complete, geometry, variants};
+use crate::program::Folder;
 
 #[test]
 fn optional_fields_may_be_left_out() {
-    let folder = tempfile::tempdir().unwrap();
-    for seed in 0..4 {
+    let folder = Folder::empty();
+    for seed in 0..12 {
         let whole = complete(seed);
         let expected = geometry(&whole.write(&folder)).unwrap();
         assert!(expected.1[0] != expected.1[3], "it moves");
@@ -27,7 +28,7 @@ fn optional_fields_may_be_left_out() {
 
 #[test]
 fn extensions_that_are_needed_and_not_read_are_named() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     for name in ["KHR_draco_mesh_compression", "KHR_node_visibility", "ACME_custom", "odd"] {
         let mut maker = complete(1);
         maker.json["extensionsRequired"] = json!(["KHR_materials_unlit", name]);
@@ -52,7 +53,7 @@ fn instanced(attributes: impl FnOnce(&mut Maker) -> serde_json::Value) -> Maker 
 
 #[test]
 fn instances_are_copies_at_their_places() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let maker = instanced(|maker| {
         let places = maker.floats("VEC3", 3, &[0., 0., 0., 0., 5., 0., 0., 0., 7.]);
         let turn = (0.5f32).sqrt();
@@ -81,7 +82,7 @@ fn instances_are_copies_at_their_places() {
 
 #[test]
 fn instances_that_cannot_be_are_a_sentence() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let refused = |maker: Maker| geometry(&maker.write(&folder)).unwrap_err();
     let said = refused(instanced(|maker| {
         let places = maker.floats("VEC3", 2, &[0.0; 6]);
@@ -105,7 +106,7 @@ fn instances_that_cannot_be_are_a_sentence() {
 
 #[test]
 fn channels_without_a_node_are_passed_over_and_pointers_are_followed() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let mut maker = Maker::new();
     let mesh = maker.triangle();
     maker.push("nodes", json!({ "mesh": mesh }));
@@ -126,7 +127,7 @@ fn channels_without_a_node_are_passed_over_and_pointers_are_followed() {
 
 #[test]
 fn clips_of_one_name_are_numbered_and_never_confused() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let mut maker = Maker::new();
     let mesh = maker.triangle();
     maker.push("nodes", json!({ "mesh": mesh }));
@@ -174,7 +175,7 @@ fn tetrahedron(skinned: bool, scale: [f64; 3]) -> Maker {
 
 #[test]
 fn an_ancestor_that_mirrors_turns_faces_skinned_or_not() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     for skinned in [false, true] {
         for scale in [[1., 1., 1.], [-1., 1., 1.], [-2., -1., 1.], [-1., -1., -1.]] {
             let path = tetrahedron(skinned, scale).write(&folder);
@@ -201,7 +202,7 @@ fn volume(triangles: &[[u32; 3]], pose: &[DVec3]) -> f64 {
 
 #[test]
 fn joints_of_zeros_need_no_data() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let whole = tetrahedron(true, [1.0; 3]);
     let expected = geometry(&whole.write(&folder)).unwrap();
     let mut without = tetrahedron(true, [1.0; 3]);
@@ -282,12 +283,12 @@ fn turned(path: &Path) -> Geometry {
 
 #[test]
 fn compressed_views_are_read_and_damaged_ones_refused() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     // Seed 2 has 32-bit indices.
     let expected = turned(&complete(2).write(&folder));
     let maker = compressed(complete(2));
     assert_eq!(turned(&maker.write(&folder)), expected);
-    let path = folder.path().join("damaged.glb");
+    let path = folder.join("damaged.glb");
     let whole = maker.glb();
     let (mut read, mut refused) = (0, 0);
     for at in (0..maker.bytes.len()).step_by(3) {

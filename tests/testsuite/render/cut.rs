@@ -12,7 +12,7 @@ use frazil::{Context, Error, Pool};
 
 use crate::common::shapes::sphere;
 use crate::picture::Picture;
-use crate::program::{CUBE, fails, works};
+use crate::program::{CUBE, Folder, fails, works};
 
 /// The ends of the ramp as pictures show them.
 const LEAST: [u8; 3] = [34, 28, 105];
@@ -21,10 +21,10 @@ const GREATEST: [u8; 3] = [227, 217, 116];
 const MIDDLE_RED: u8 = 57;
 
 /// A folder with the level set of a ball around the origin of a radius of 0.5 m, in cells of 2 cm.
-fn with_ball() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    mesh::write(&folder.path().join("ball.obj"), &sphere(0.5, 48)).unwrap();
-    works(folder.path(), "vdb from-mesh ball.obj --cell 0.02 -o ball.vdb -q");
+fn with_ball() -> Folder {
+    let folder = Folder::empty();
+    mesh::write(&folder.join("ball.obj"), &sphere(0.5, 48)).unwrap();
+    works(&folder, "vdb from-mesh ball.obj --cell 0.02 -o ball.vdb -q");
     folder
 }
 
@@ -59,7 +59,7 @@ fn is_ink(rgb: [u8; 3]) -> bool {
 #[test]
 fn the_distances_of_a_ball_change_sign_at_its_radius() {
     let folder = with_ball();
-    let picture = picture(folder.path(), &format!("ball.vdb {VIEW}"));
+    let picture = picture(&folder, &format!("ball.vdb {VIEW}"));
     let mut on_line = 0u32;
     for ([x, z], rgb) in positions(&picture) {
         let across = (x * x + z * z).sqrt();
@@ -87,8 +87,7 @@ fn the_distances_of_a_ball_change_sign_at_its_radius() {
 
 #[test]
 fn a_mesh_is_a_line_on_the_colours_of_a_grid() {
-    let folder = with_ball();
-    let folder = folder.path();
+    let folder = &with_ball();
     fs::write(folder.join("cube.obj"), CUBE).unwrap();
     let before = picture(folder, &format!("ball.vdb {VIEW}"));
     let after = picture(folder, &format!("ball.vdb cube.obj {VIEW}"));
@@ -125,10 +124,10 @@ fn steps(step: f32) -> FloatGrid {
 
 /// The pixels of a cut through such a fog, ascending along x from its first voxel to its last, and what the command says.
 fn along(step: f32) -> (Vec<[u8; 3]>, String) {
-    let folder = tempfile::tempdir().unwrap();
-    file::write(&folder.path().join("fog.vdb"), &[&steps(step)], &WriteOptions::default()).unwrap();
-    let said = works(folder.path(), "preview fog.vdb --cut z=0.35 --size 160x90 -v -o cut.png");
-    let picture = Picture::open(&folder.path().join("cut.png"));
+    let folder = Folder::empty();
+    file::write(&folder.join("fog.vdb"), &[&steps(step)], &WriteOptions::default()).unwrap();
+    let said = works(&folder, "preview fog.vdb --cut z=0.35 --size 160x90 -v -o cut.png");
+    let picture = Picture::open(&folder.join("cut.png"));
     // Its voxels, 0.8 m of them around x = 0.35 m, fill the height but for 4 % at each edge.
     let x = |column: usize| 0.35 + (column as f64 + 0.5 - 80.0) * 0.8 / 0.92 / 90.0;
     let inside = (0..160).filter(|c| (0.0..=0.7).contains(&x(*c)));
@@ -161,8 +160,7 @@ fn leaves_are_listed_within_the_limit_of_memory() {
 
 #[test]
 fn the_same_cut_from_any_number_of_threads_and_in_a_flipbook() {
-    let folder = with_ball();
-    let folder = folder.path();
+    let folder = &with_ball();
     let one = picture(folder, "ball.vdb ball.obj --cut x=0.1 --size 160x90 --threads 1");
     assert!(one == picture(folder, "ball.vdb ball.obj --cut x=0.1 --size 160x90 --threads 3"));
     for frame in ["0001", "0002"] {
@@ -174,8 +172,7 @@ fn the_same_cut_from_any_number_of_threads_and_in_a_flipbook() {
 
 #[test]
 fn what_cannot_be_cut_is_refused() {
-    let folder = with_ball();
-    let folder = folder.path();
+    let folder = &with_ball();
     fs::write(folder.join("drop.xyz"), "0 0 0\n1 1 1\n").unwrap();
     for (arguments, words) in [
         ("ball.vdb --cut y=2", &["--cut y=2 is beside what is drawn", "-0.5"][..]),

@@ -4,6 +4,7 @@
 use crate::common::skip::skipped;
 use std::path::Path;
 
+use crate::program::Folder;
 use frazil::geometry::points::{Column, Points, Values};
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::numeric::blocks::{Block, BlockEdit};
@@ -174,7 +175,7 @@ fn python(folder: &Path, script: &str) -> bool {
 
 #[test]
 fn a_fog_is_where_the_transform_of_its_grid_puts_it() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     // Voxels of 0.5 m: moved by half of one; turned by 90 degrees about y, and flatter.
     let script = "import pyopenvdb as v\n\
         def write(name, rows):\n\
@@ -182,7 +183,7 @@ fn a_fog_is_where_the_transform_of_its_grid_puts_it() {
         \x20 g.transform = v.createLinearTransform(rows); g.fill((8, 16, -8), (15, 23, -1), 1.0); v.write(name, g)\n\
         write('moved.vdb', [[.5,0,0,0],[0,.5,0,0],[0,0,.5,0],[.25,.25,.25,1]])\n\
         write('turned.vdb', [[0,0,-.5,0],[0,.25,0,0],[.5,0,0,0],[0,0,0,1]])";
-    if !python(folder.path(), script) {
+    if !python(&folder, script) {
         skipped("no pyopenvdb");
         return;
     }
@@ -191,7 +192,7 @@ fn a_fog_is_where_the_transform_of_its_grid_puts_it() {
         ("turned.vdb", [-4.25, 3.875, -7.75], [-0.25, 5.875, -3.75]),
     ];
     for (name, low, high) in expected {
-        let grid = file::read_named(&folder.path().join(name), None).unwrap();
+        let grid = file::read_named(&folder.join(name), None).unwrap();
         let (seen_low, seen_high) = fog(&grid, 1.0).bounds().unwrap();
         assert!((seen_low - DVec3::from(low)).norm() < 1e-9, "{name}: {seen_low}");
         assert!((seen_high - DVec3::from(high)).norm() < 1e-9, "{name}: {seen_high}");

@@ -7,7 +7,7 @@ use frazil::io::mesh;
 use nalgebra::Matrix3;
 
 use crate::common::jelly::{FRAMES, Jelly, moved};
-use crate::program::works;
+use crate::program::{Folder, works};
 
 const MAKEFILE: &str = include_str!("../../../Makefile");
 /// As the demonstration has it.
@@ -77,8 +77,7 @@ fn commands(spacing: f64) -> Vec<String> {
 
 #[test]
 fn the_demonstration_tracks_a_coarse_jelly() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let jelly = Jelly::new(2.0 * SPACING, 60);
     jelly.write(folder).unwrap();
     let commands = commands(jelly.spacing);

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use crate::common::character;
-use crate::program::{CUBE, fails, works};
+use crate::program::{CUBE, Folder, fails, works};
 use frazil::io::files::sequence::Pattern;
 use frazil::io::records::checksummed;
 use frazil::scene::run::Run;
@@ -148,9 +148,9 @@ fn write_meshes(folder: &Path) {
 
 #[test]
 fn ten_thousand_changed_scenes_are_read_or_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    write_meshes(folder.path());
-    let path = folder.path().join("shot.toml");
+    let folder = Folder::empty();
+    write_meshes(&folder);
+    let path = folder.join("shot.toml");
     let ctx = Context::new(Pool::new(1).unwrap());
     let mut random = Random(1);
     let (mut read, mut checked) = (0, 0);
@@ -181,14 +181,14 @@ fn scenes_that_panicked_are_refused() {
             skipped("no data");
             return;
         };
-        let folder = tempfile::tempdir().unwrap();
-        write_meshes(folder.path());
+        let folder = Folder::empty();
+        write_meshes(&folder);
         let text = fs::read_to_string(&path).unwrap();
-        fs::write(folder.path().join("shot.toml"), &text).unwrap();
-        fs::copy(folder.path().join("cube.obj"), folder.path().join("egg.obj")).unwrap();
-        works(folder.path(), "vdb from-mesh cube.obj --cell 0.016 -o x.vdb");
-        fails(folder.path(), "snow shot.toml -o out", 2, &["seq.%"]);
-        fails(folder.path(), "check shot.toml", 2, &["seq.%"]);
+        fs::write(folder.join("shot.toml"), &text).unwrap();
+        fs::copy(folder.join("cube.obj"), folder.join("egg.obj")).unwrap();
+        works(&folder, "vdb from-mesh cube.obj --cell 0.016 -o x.vdb");
+        fails(&folder, "snow shot.toml -o out", 2, &["seq.%"]);
+        fails(&folder, "check shot.toml", 2, &["seq.%"]);
     }
 }
 
@@ -218,14 +218,14 @@ fn changed(random: &mut Random, value: &mut Value) {
 
 #[test]
 fn ten_thousand_changed_records_are_used_or_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    write_meshes(folder.path());
-    let path = folder.path().join("shot.toml");
+    let folder = Folder::empty();
+    write_meshes(&folder);
+    let path = folder.join("shot.toml");
     fs::write(&path, SCENES[0]).unwrap();
-    works(folder.path(), "snow shot.toml -o out -q --set output.half=true --set output.base_mode=full");
-    let (scene, out) = (folder.path().join("out/scene.toml"), folder.path().join("out"));
+    works(&folder, "snow shot.toml -o out -q --set output.half=true --set output.base_mode=full");
+    let (scene, out) = (folder.join("out/scene.toml"), folder.join("out"));
     // Beside the first folder: the paths in it are relative.
-    let half = folder.path().join("half");
+    let half = folder.join("half");
     fs::create_dir(&half).unwrap();
     fs::copy(&scene, half.join("half.toml")).unwrap();
     let scene = Scene::read(&half.join("half.toml")).unwrap();
@@ -233,7 +233,7 @@ fn ten_thousand_changed_records_are_used_or_refused() {
     let ctx = Context::new(Pool::new(1).unwrap());
     let mut random = Random(2);
     let names = ["base.json", "base.0003.json", "files.json", "base.0004.json"];
-    let precious = folder.path().join("precious");
+    let precious = folder.join("precious");
     fs::write(&precious, "mine").unwrap();
     let all: FrameChoice = scene.shot().frames.into();
     let some = FrameChoice::from("2-3".parse::<frazil::scene::Frames>().unwrap());
@@ -276,7 +276,7 @@ fn ten_thousand_changed_records_are_used_or_refused() {
         {
             // A run that could resume from a frame has removed what comes after it.
             let _ = fs::remove_dir_all(&out);
-            works(folder.path(), "snow half/half.toml -o out -q");
+            works(&folder, "snow half/half.toml -o out -q");
         }
     }
     assert!(refused > ROUNDS / 8, "{refused}");
@@ -284,15 +284,15 @@ fn ten_thousand_changed_records_are_used_or_refused() {
 
 #[test]
 fn ten_thousand_changed_states_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    write_meshes(folder.path());
-    fs::write(folder.path().join("shot.toml"), SCENES[0]).unwrap();
-    works(folder.path(), "snow shot.toml -o out -q --set output.half=true --set output.base_mode=full");
-    let state = folder.path().join("out/state/base.0004.vdb");
+    let folder = Folder::empty();
+    write_meshes(&folder);
+    fs::write(folder.join("shot.toml"), SCENES[0]).unwrap();
+    works(&folder, "snow shot.toml -o out -q --set output.half=true --set output.base_mode=full");
+    let state = folder.join("out/state/base.0004.vdb");
     let whole = fs::read(&state).unwrap();
     let ctx = Context::new(Pool::new(1).unwrap());
     let mut random = Random(3);
-    let mut opened = Rebuild::open(&folder.path().join("out")).unwrap();
+    let mut opened = Rebuild::open(&folder.join("out")).unwrap();
     for round in 0..ROUNDS {
         let mut bytes = whole.clone();
         let at = random.below(bytes.len());

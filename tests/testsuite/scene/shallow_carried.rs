@@ -8,7 +8,8 @@ use frazil::io::mesh;
 use serde_json::Value;
 
 use super::shallow_shot::{are_same, report};
-use crate::program::{command, kill_at, works};
+use crate::common::shapes::squares;
+use crate::program::{Folder, command, kill_at, works};
 
 /// A floor, and a shelf over the half of it with the lesser x, 5 cm higher.
 fn shelf() -> TriMesh {
@@ -42,8 +43,7 @@ fn amounts(report: &Value, scalar: &str) -> [f64; 6] {
 
 #[test]
 fn what_falls_and_what_it_carries_add_up_and_are_in_the_mesh() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder, FALLS, CARRIED);
     let said = works(folder, "check spill.toml");
     assert!(said.contains("falls     freely") && said.contains("carries   milk, age, heat"), "{said}");
@@ -99,8 +99,7 @@ fn what_falls_and_what_it_carries_add_up_and_are_in_the_mesh() {
 
 #[test]
 fn a_shot_that_falls_and_carries_resumes_to_the_same_bytes() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let tool = "[[object]]\nshape = \"sphere\"\nradius = 0.006\n\
                 keys = [{ frame = 1, at = [0.03, 0.03, 0] }, { frame = 30, at = [0.004, 0.02, 0] }]\n";
     write_shot(folder, FALLS, &format!("{CARRIED}{tool}"));
@@ -137,8 +136,7 @@ fn a_shot_that_falls_and_carries_resumes_to_the_same_bytes() {
 
 #[test]
 fn bumps_of_a_mesh_do_not_show_through_films() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     // Bumps between the middles of cells, on a sheet that is deeper in its middle, and may move.
     let bumpy = |high: f32| {
         let count = 81u32;
@@ -147,10 +145,7 @@ fn bumps_of_a_mesh_do_not_show_through_films() {
             let bump = if (index % count + index / count).is_multiple_of(4) { high } else { 0.0 };
             Vec3::new(x, 2.0 * (x * x + z * z) + bump, z)
         };
-        let is_square = |index: &u32| index % count + 1 < count && index / count + 1 < count;
-        let square = |a: u32| [[a, a + count, a + count + 1], [a, a + count + 1, a + 1]];
-        let triangles = (0..count * count).filter(is_square).flat_map(square).collect();
-        TriMesh { positions: (0..count * count).map(position).collect(), triangles }
+        squares(count, position)
     };
     for frame in 1..=4 {
         mesh::write(&folder.join(format!("bumpy.{frame:04}.ply")), &bumpy(0.0004 + 0.0001 * frame as f32))
@@ -182,8 +177,7 @@ fn bumps_of_a_mesh_do_not_show_through_films() {
 
 #[test]
 fn liquid_that_thickens_and_that_walls_hold_back_runs_less_far_and_resumes() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let source = "[[source]]\nat = [-0.03, 0, 0]\nradius = 0.004\nrate_ml = 4\ncarries = { milk = 1 }\n\
                   [[pour]]\nat = [-0.03, 0, 0]\nradius = 0.006\nvolume_ml = 2\n";
     let scalars = "[[scalar]]\nname = \"age\"\nlaw = \"ages\"\nrange = 60\n\
@@ -216,8 +210,7 @@ fn liquid_that_thickens_and_that_walls_hold_back_runs_less_far_and_resumes() {
 
 #[test]
 fn liquid_stains_the_terrain_and_resumes_with_its_stains() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let tables = "[[scalar]]\nname = \"milk\"\nstains = true\n\
                   [[pour]]\nat = [0.01, 0, 0]\nradius = 0.006\nvolume_ml = 2\ncarries = { milk = 1 }\n";
     write_shot(folder, "border = \"closed\"\nstains = true\nlifts = false\n", tables);
@@ -226,10 +219,7 @@ fn liquid_stains_the_terrain_and_resumes_with_its_stains() {
     let position = |index: u32| {
         Vec3::new(0.002 * (index % count) as f32 - 0.04, 0.0, 0.002 * (index / count) as f32 - 0.04)
     };
-    let is_square = |index: &u32| index % count + 1 < count && index / count + 1 < count;
-    let square = |a: u32| [[a, a + count, a + count + 1], [a, a + count + 1, a + 1]];
-    let triangles = (0..count * count).filter(is_square).flat_map(square).collect();
-    let floor = TriMesh { positions: (0..count * count).map(position).collect(), triangles };
+    let floor = squares(count, position);
     mesh::write(&folder.join("shelf.ply"), &floor).unwrap();
     let shot = "shallow spill.toml";
     works(folder, &format!("{shot} -o whole"));

@@ -8,7 +8,8 @@ use frazil::io::mesh;
 use serde_json::Value;
 
 use super::shallow_shot::{are_same, ml, report, resume_in_every_way};
-use crate::program::{fails, works};
+use crate::common::shapes::squares;
+use crate::program::{Folder, fails, works};
 
 /// A sheet of 40 x 40 cm in squares of 2 cm that has slid along x (m) and falls along its own x.
 fn sheet(slid: f32, slope: f32) -> TriMesh {
@@ -17,10 +18,7 @@ fn sheet(slid: f32, slope: f32) -> TriMesh {
         let [x, z] = [index % count, index / count].map(|at| 0.02 * (at as f32 - 10.0));
         Vec3::new(x + slid, -slope * x, z)
     };
-    let is_square = |index: &u32| index % count + 1 < count && index / count + 1 < count;
-    let square = |a: u32| [[a, a + count, a + count + 1], [a, a + count + 1, a + 1]];
-    let triangles = (0..count * count).filter(is_square).flat_map(square).collect();
-    TriMesh { positions: (0..count * count).map(position).collect(), triangles }
+    squares(count, position)
 }
 
 /// A scene of 8 frames over the middle 8 x 8 cm of a terrain, which stays within 2 cm of 0, with more lines of [shallow], and tables.
@@ -86,8 +84,7 @@ fn lies_within([x0, x1, z0, z1]: [f32; 4], x: [f32; 2], z: [f32; 2]) {
 
 #[test]
 fn a_source_follows_the_ground_that_slides_and_tilts() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     // By frame 7 it has slid 3 cm, by frame 8 3.5 cm.
     write_ground(folder, 8, |frame| sheet(0.005 * (frame - 1) as f32, 0.008 * (frame - 1) as f32));
     let source = "[[source]]\nat = [-0.02, 0, 0.01]\nradius = 0.004\nrate_ml = 6\nfrom = 7\nfollows = true\n";
@@ -112,8 +109,7 @@ fn a_source_follows_the_ground_that_slides_and_tilts() {
 
 #[test]
 fn a_source_stays_on_its_shelf() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     // A shelf over the ground slides away and rises.
     let ground = |frame: i32| {
         let way = (frame - 1) as f32;
@@ -144,8 +140,7 @@ fn a_source_stays_on_its_shelf() {
 
 #[test]
 fn drains_and_absorbers_follow_too_and_gauze_stays_wet() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_ground(folder, 8, |frame| sheet(0.005 * (frame - 1) as f32, 0.0));
     let points = "[[drain]]\nat = [-0.02, 0, 0.01]\nradius = 0.006\nrate_ml = 12\nfrom = 7\nfollows = true\n\
         [[absorber]]\nat = [-0.02, 0, -0.02]\nradius = 0.006\nrate_ml = 1\ncapacity_ml = 0.05\nfollows = true\n";
@@ -178,8 +173,7 @@ fn out_and_back(frame: i32) -> TriMesh {
 
 #[test]
 fn what_leaves_the_area_rests_until_it_comes_back() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_ground(folder, 8, out_and_back);
     let points = "[[source]]\nat = [0.03, 0, 0.01]\nradius = 0.003\nrate_ml = 6\nfollows = true\n\
         [[source]]\nat = [0, 0, -0.01]\nradius = 0.003\nrate_ml = 6\nfollows = true\n\
@@ -226,17 +220,16 @@ fn what_leaves_the_area_rests_until_it_comes_back() {
 
 #[test]
 fn what_never_comes_has_no_sign() {
-    let folder = tempfile::tempdir().unwrap();
-    write_ground(folder.path(), 8, |_| sheet(0.0, 0.0));
-    write_scene(folder.path(), "", "");
-    let said = works(folder.path(), "check spill.toml");
+    let folder = Folder::empty();
+    write_ground(&folder, 8, |_| sheet(0.0, 0.0));
+    write_scene(&folder, "", "");
+    let said = works(&folder, "check spill.toml");
     assert!(said.contains(" 0.0000 ml come later") && !said.contains("-0.0000"), "{said}");
 }
 
 #[test]
 fn what_an_obstacle_covers_rests_and_the_shot_resumes() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_ground(folder, 8, |_| sheet(0.0, 0.0));
     let tables = "[[source]]\nat = [0, 0, 0]\nradius = 0.002\nrate_ml = 6\n\
         [[source]]\nat = [0, 0, 0]\nradius = 0.002\nrate_ml = 6\nfollows = true\n\
@@ -262,8 +255,7 @@ fn what_an_obstacle_covers_rests_and_the_shot_resumes() {
 
 #[test]
 fn they_resume_to_the_same_bytes_on_any_threads() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_ground(folder, 40, out_and_back);
     let points = "[[pour]]\nat = [0, 0.05, 0]\nradius = 0.02\nvolume_ml = 2\n\
         [[source]]\nat = [0.03, 0, 0.01]\nradius = 0.003\nrate_ml = 6\nfrequency = 3\nswing = 0.5\nfollows = true\n\

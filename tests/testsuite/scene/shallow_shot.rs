@@ -8,7 +8,8 @@ use frazil::io::mesh;
 use serde_json::Value;
 
 use crate::common::character::output;
-use crate::program::{command, fails, kill_at, works};
+use crate::common::shapes::squares;
+use crate::program::{Folder, command, fails, kill_at, works};
 
 /// A sheet of 40 x 40 cells of 2 mm that falls along x, whose bumps are so high (m), raised by a height (m).
 fn slope(bumps: f32, raised: f32) -> TriMesh {
@@ -18,10 +19,7 @@ fn slope(bumps: f32, raised: f32) -> TriMesh {
         let wave = |at: f32| 4.0 * at * at * 625.0 - (at * at * 625.0) * (at * at * 625.0);
         Vec3::new(x, raised - 0.2 * x + bumps * wave(x) * wave(z), z)
     };
-    let is_square = |index: &u32| index % count + 1 < count && index / count + 1 < count;
-    let square = |a: u32| [[a, a + count, a + count + 1], [a, a + count + 1, a + 1]];
-    let triangles = (0..count * count).filter(is_square).flat_map(square).collect();
-    TriMesh { positions: (0..count * count).map(position).collect(), triangles }
+    squares(count, position)
 }
 
 const LIQUID: &str = "[[pour]]\nat = [-0.02, 0.05, 0]\nradius = 0.008\nvolume_ml = 1.5\n\
@@ -67,8 +65,7 @@ pub fn are_same(folder: &Path, a: &str, b: &str) {
 
 #[test]
 fn all_liquid_is_accounted_for_and_points_act_at_their_frames() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder, "", LIQUID);
     works(folder, "shallow spill.toml -o out");
     let first = ml(&report(folder, "out", 1));
@@ -104,8 +101,7 @@ fn all_liquid_is_accounted_for_and_points_act_at_their_frames() {
 
 #[test]
 fn threads_kills_and_another_order_of_frames_give_the_same_bytes() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     for (name, tables) in [("still", LIQUID.to_string()), ("moving", format!("{LIQUID}{OBSTACLES}"))] {
         let folder = folder.join(name);
         fs::create_dir(&folder).unwrap();
@@ -139,8 +135,7 @@ pub fn resume_in_every_way(folder: &Path) {
 
 #[test]
 fn a_run_goes_on_with_other_settings_but_not_on_another_terrain() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder, "", &format!("{LIQUID}{OBSTACLES}"));
     let shot = "shallow spill.toml -o out";
     works(folder, shot);
@@ -191,8 +186,7 @@ fn a_run_goes_on_with_other_settings_but_not_on_another_terrain() {
 
 #[test]
 fn a_terrain_that_moves_loses_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder, "border = \"closed\"\n", LIQUID);
     for frame in 1..=24 {
         let raised = 0.001 * (frame % 4) as f32;
@@ -231,8 +225,7 @@ fn a_terrain_that_moves_loses_nothing() {
 
 #[test]
 fn an_obstacle_pushes_liquid_away_and_none_is_lost() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     // A tray with a pool into which a ball is lowered.
     mesh::write(&folder.join("slope.ply"), &TriMesh::cuboid([-0.04, -0.01, -0.04], [0.04, 0.0, 0.04]))
         .unwrap();

@@ -7,7 +7,7 @@ use frazil::geometry::TriMesh;
 use frazil::io::mesh;
 use frazil::vdb::{FloatGrid, GridClass, file};
 
-use crate::program::{fails, works};
+use crate::program::{Folder, fails, works};
 
 /// A block of 8 x 2 x 8 cm whose top is at 0, and a scene with a pool on it, 3 mm deep, and a film.
 fn write_shot(folder: &Path, lines: &str) {
@@ -33,8 +33,7 @@ fn sum(grid: &FloatGrid) -> f64 {
 
 #[test]
 fn the_volume_holds_all_of_the_liquid() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     // A film of 10 um, and liquid poured onto it.
     write_shot(folder, "fill = 0.00001\n[[pour]]\nat = [0.01, 0, 0]\nradius = 0.01\nvolume_ml = 1.5\n");
     works(folder, "shallow spill.toml -o out");
@@ -66,8 +65,7 @@ fn the_volume_holds_all_of_the_liquid() {
 
 #[test]
 fn a_level_set_is_a_terrain_like_its_mesh() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder, "fill = 0.003\n");
     works(folder, "vdb from-mesh block.ply --cell 0.001 -o block.vdb");
     works(folder, "shallow spill.toml -o mesh");

@@ -14,7 +14,7 @@ use frazil::{Context, Pool};
 use super::fuzz::Random;
 use super::shot_grains::{folder, grains};
 use crate::common::character;
-use crate::program::{fails, frazil, works};
+use crate::program::{Folder, fails, frazil, works};
 
 /// The bytes of a file of grains apart from settings, all paths from folder `at`.
 fn apart_from_settings(at: &Path, file: &str, out: &str, frame: i32) -> Vec<u8> {
@@ -26,8 +26,7 @@ fn whole_files_of_grains_are_made_from_changes_byte_by_byte() {
     for (table, frames) in
         [("compression = 0.4", 36), ("compression = 0.4\nlifetime = 0.25\nradius = 0.004", 12)]
     {
-        let folder = folder(table, "");
-        let at = folder.path();
+        let at = &folder(table, "");
         let run = format!("snow shot.toml -q --set shot.frames=1-{frames}");
         works(at, &format!("{run} -o full"));
         works(at, &format!("{run} -o delta --set output.grains_mode=delta"));
@@ -67,8 +66,7 @@ fn whole_files_of_grains_are_made_from_changes_byte_by_byte() {
 
 #[test]
 fn changes_are_made_again_as_they_were_and_for_other_settings_anew() {
-    let folder = folder("compression = 0.4", "grains_mode = \"delta\"");
-    let at = folder.path();
+    let at = &folder("compression = 0.4", "grains_mode = \"delta\"");
     works(at, "snow shot.toml -o out -q");
     let first = grains(at, "out");
     // From the state before the first frame, and from that of the frame before.
@@ -100,8 +98,7 @@ fn changes_are_made_again_as_they_were_and_for_other_settings_anew() {
 #[test]
 fn changes_are_the_same_from_any_threads_stops_and_starts() {
     // Some grains are always gone, and frame 25 is whole.
-    let folder = folder("compression = 0.4\nlifetime = 0.3\nradius = 0.005", "grains_mode = \"delta\"");
-    let at = folder.path();
+    let at = &folder("compression = 0.4\nlifetime = 0.3\nradius = 0.005", "grains_mode = \"delta\"");
     let run = "snow shot.toml -q --set shot.frames=1-28";
     works(at, &format!("{run} -o once --threads 2"));
     let once = grains(at, "once");
@@ -164,8 +161,7 @@ fn rounds(usual: usize) -> usize {
 
 #[test]
 fn damaged_changes_are_one_error_that_names_the_file() {
-    let folder = folder("compression = 0.4", "grains_mode = \"delta\"");
-    let at = folder.path();
+    let at = &folder("compression = 0.4", "grains_mode = \"delta\"");
     works(at, "snow shot.toml -o out -q");
     works(at, "snow shot.toml -o other -q --set grains.seed=1");
     let (ctx, options) = (Context::new(Pool::new(1).unwrap()), WriteOptions::default());
@@ -225,8 +221,7 @@ fn damaged_changes_are_one_error_that_names_the_file() {
 
 #[test]
 fn damaged_changes_are_one_error_of_every_command() {
-    let folder = folder("compression = 0.4\nradius = 0.005", "grains_mode = \"delta\"");
-    let at = folder.path();
+    let at = &folder("compression = 0.4\nradius = 0.005", "grains_mode = \"delta\"");
     works(at, "snow shot.toml -o out -q --frames 1-3");
     let whole = fs::read(at.join("out/grains/grains.0003.vdb")).unwrap();
     let mut random = Random(6);
@@ -280,18 +275,18 @@ fn grains_of(ids: &[i64]) -> Points {
 
 #[test]
 fn changes_that_do_not_fit_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let ctx = Context::new(Pool::new(1).unwrap());
     let rebuilt = |held: &Points, since: i64, gone: Option<&str>| {
         let mut metadata = vec![("frazil:changes_since".into(), MetaValue::Int(since))];
         metadata.extend(gone.map(|gone| ("frazil:gone".into(), MetaValue::Text(gone.into()))));
-        let out = made_up(folder.path(), held, metadata);
+        let out = made_up(&folder, held, metadata);
         let mut cache = RebuildGrains::open(&out).unwrap();
         cache.bytes(&ctx, 2, &WriteOptions::default()).map_err(|error| error.to_string())
     };
     let held = grains_of(&[2, 9]);
     let bytes = rebuilt(&held, 1, Some("3,8")).unwrap();
-    let path = folder.path().join("whole.vdb");
+    let path = folder.join("whole.vdb");
     fs::write(&path, bytes).unwrap();
     let whole = points::read_own(&path, None).unwrap();
     let Some(Values::Long(ids)) = whole.attribute("id") else { panic!("{whole:?}") };
@@ -361,14 +356,13 @@ fn what_holds_changes_says_so() {
         ("grains_mode = \"delta\"\ngrains = []", "grains_mode"),
     ] {
         let folder = super::shot_grains::folder("", written);
-        fails(folder.path(), "snow shot.toml -o out -q", 2, &["shot.toml", words]);
+        fails(&folder, "snow shot.toml -o out -q", 2, &["shot.toml", words]);
     }
 }
 
 #[test]
 fn shot_usda_has_the_grains_that_have_usd_files() {
-    let folder = folder("compression = 0.4", "objects = [\"usd\"]\ngrains = [\"vdb\", \"usd\"]");
-    let at = folder.path();
+    let at = &folder("compression = 0.4", "objects = [\"usd\"]\ngrains = [\"vdb\", \"usd\"]");
     works(at, "snow shot.toml -o out -q");
     let stage = fs::read_to_string(at.join("out/shot.usda")).unwrap();
     let assets: Vec<&str> = stage.split('@').skip(1).step_by(2).collect();

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use super::shot_grains::{folder, grains};
-use crate::program::{CUBE, fails, frazil, works};
+use crate::program::{CUBE, Folder, fails, frazil, works};
 use frazil::geometry::DVec3;
 use frazil::io::particles::ply;
 
@@ -30,8 +30,7 @@ fn report(at: &Path, frame: i32) -> serde_json::Value {
 
 #[test]
 fn a_layer_of_a_file_may_have_a_ground_on_which_grains_lie() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+    let at = &Folder::empty();
     fs::write(at.join("cube.obj"), CUBE).unwrap();
     works(at, "vdb from-mesh cube.obj --cell 0.02 -o layer.vdb -q");
     let plane = "v -2 -.05 -2\nv 2 -.05 -2\nv 2 -.05 2\nv -2 -.05 2\nf 1 4 3 2\n";
@@ -62,8 +61,7 @@ fn a_layer_of_a_file_may_have_a_ground_on_which_grains_lie() {
 
 #[test]
 fn a_wall_that_no_attraction_holds_is_refused_with_the_highest_that_stands() {
-    let folder = folder("radius = 0.002\nstands = 2.0", "");
-    let at = folder.path();
+    let at = &folder("radius = 0.002\nstands = 2.0", "");
     for command in ["check shot.toml", "snow shot.toml -o out -q"] {
         fails(at, command, 2, &["shot.toml:10", "`stands`", "0.002 m", "32 degrees", "at most"]);
     }
@@ -77,8 +75,7 @@ fn a_wall_that_no_attraction_holds_is_refused_with_the_highest_that_stands() {
 
 #[test]
 fn points_that_can_be_no_grains_are_refused_before_the_base_is_made() {
-    let folder = folder("initial = \"drift.ply\"", "");
-    let at = folder.path();
+    let at = &folder("initial = \"drift.ply\"", "");
     let good = ["0", "0.5", "0", "0", "0", "0"];
     for (point, words) in [
         (["nan", "0.5", "0", "0", "0", "0"], ["the position of point 2", "is not finite"]),
@@ -103,8 +100,7 @@ fn points_in_the_snow_or_below_the_ground_are_left_out_and_counted() {
     // On the snow, which is 0.2 m deep, and in it by less than a tenth of a diameter of 13.3 mm.
     let on = ["-0.4", "0.205", "0.9", "0", "0", "0"];
     let dipped = ["-0.4", "0.199", "0.7", "0", "0", "0"];
-    let folder = folder("initial = \"drift.ply\"\ncompression = 1.0", "grains = [\"vdb\", \"ply\"]");
-    let at = folder.path();
+    let at = &folder("initial = \"drift.ply\"\ncompression = 1.0", "grains = [\"vdb\", \"ply\"]");
     fs::write(at.join("drift.ply"), points(&[snow, air, below, on, dipped])).unwrap();
     let said = works(at, "snow shot.toml -o out");
     let warned: Vec<&str> = said.lines().filter(|line| line.contains("left out")).collect();
@@ -122,8 +118,7 @@ fn points_in_the_snow_or_below_the_ground_are_left_out_and_counted() {
 
 #[test]
 fn a_radius_of_a_file_that_grains_do_not_have_is_reported() {
-    let folder = folder("initial = \"drift.ply\"\nradius = 0.005", "");
-    let at = folder.path();
+    let at = &folder("initial = \"drift.ply\"\nradius = 0.005", "");
     let file = |radius: &str| {
         let text = points(&[["0", "0.5", "0", "0", "0", radius]]).replace("float vz", "float pscale");
         fs::write(at.join("drift.ply"), text).unwrap();
@@ -139,8 +134,7 @@ fn a_radius_of_a_file_that_grains_do_not_have_is_reported() {
 
 #[test]
 fn an_object_smaller_than_a_grain_is_reported() {
-    let folder = folder("compression = 0.0\nradius = 0.005", "");
-    let at = folder.path();
+    let at = &folder("compression = 0.0\nradius = 0.005", "");
     let small = "--set object.1.scale=0.02";
     for command in ["check shot.toml", "snow shot.toml -o out --frames 1-2"] {
         let said = works(at, &format!("{command} {small}"));
@@ -158,8 +152,7 @@ fn an_object_smaller_than_a_grain_is_reported() {
 
 #[test]
 fn an_object_that_jumps_is_reported_with_its_speed_and_frame() {
-    let folder = folder("", "");
-    let at = folder.path();
+    let at = &folder("", "");
     let scene = fs::read_to_string(at.join("shot.toml")).unwrap();
     let jump = |z: f64| {
         let jumping = scene.replace(
@@ -183,8 +176,7 @@ fn an_object_that_jumps_is_reported_with_its_speed_and_frame() {
 
 #[test]
 fn keys_that_others_stand_in_place_of_are_reported() {
-    let folder = folder("", "");
-    let at = folder.path();
+    let at = &folder("", "");
     let said = |set: &str| works(at, &format!("check shot.toml {set}"));
     let both = said("--set grains.friction=0.2 --set grains.repose_angle_deg=25");
     assert!(both.contains("grains.friction = 0.2 replaces grains.repose_angle_deg = 25"), "{both}");
@@ -197,8 +189,7 @@ fn keys_that_others_stand_in_place_of_are_reported() {
 
 #[test]
 fn an_estimate_that_is_little_over_max_is_a_warning() {
-    let folder = folder("compression = 0.4", "");
-    let at = folder.path();
+    let at = &folder("compression = 0.4", "");
     works(at, "snow shot.toml -o out -q");
     let count = report(at, 10)["grains"].as_u64().unwrap();
     let owed = report(at, 10)["owed"].as_f64().unwrap();
@@ -221,16 +212,15 @@ fn an_estimate_that_is_little_over_max_is_a_warning() {
 #[test]
 fn a_check_of_a_preview_has_its_cells() {
     let folder = folder("", "");
-    let said = works(folder.path(), "check shot.toml --preview 2");
+    let said = works(&folder, "check shot.toml --preview 2");
     assert!(said.contains("cells of 0.04 m"), "{said}");
-    fails(folder.path(), "check shot.toml --preview 0", 2, &["--preview"]);
-    fails(folder.path(), "check . --preview 2", 2, &["--preview"]);
+    fails(&folder, "check shot.toml --preview 0", 2, &["--preview"]);
+    fails(&folder, "check . --preview 2", 2, &["--preview"]);
 }
 
 #[test]
 fn a_replaced_base_file_and_frames_to_start_from_are_named_as_they_are() {
-    let folder = folder("", "");
-    let at = folder.path();
+    let at = &folder("", "");
     works(at, "snow shot.toml -o out -q --frames 1-6 --set shot.frames=1-6");
     // Of the grains only the last two frames are kept exactly; there is no frame 7.
     let from = "snow shot.toml -o out -q --stage grains --from 4 --set shot.frames=1-6";
@@ -245,8 +235,7 @@ fn a_replaced_base_file_and_frames_to_start_from_are_named_as_they_are() {
 
 #[test]
 fn what_is_owed_is_never_less_than_nothing() {
-    let folder = folder("compression = 1.0", "");
-    let at = folder.path();
+    let at = &folder("compression = 1.0", "");
     works(at, "snow shot.toml -o out -q --frames 1-2");
     let text = fs::read_to_string(at.join("out/report/grains.0002.json")).unwrap();
     assert!(text.contains("\"owed\": 0.0"), "{text}");

@@ -4,19 +4,18 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::character::output;
-use crate::program::{CUBE, fails, kill_at, works};
-use tempfile::TempDir;
+use crate::program::{CUBE, Folder, fails, kill_at, works};
 
 /// A folder with a cube that slides through snow; `grains` and `output` stand in the scene's tables.
-pub fn folder(grains: &str, output: &str) -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
+pub fn folder(grains: &str, output: &str) -> Folder {
+    let folder = Folder::empty();
+    fs::write(folder.join("cube.obj"), CUBE).unwrap();
     let scene = format!(
         "[shot]\nframes = \"1-10\"\n[snow]\nground = 0.0\narea = [-0.5, -0.5, 0.5, 1.0]\ndepth = 0.2\ncell = 0.02\n\
          [grains]\n{grains}\n[output]\n{output}\n[[object]]\nfile = \"cube.obj\"\nkeys = [{{ frame = 1, at = [0, 0.1, 0] }}, \
          {{ frame = 10, at = [0, 0.1, 0.4], turn_deg = [0, 40, 0] }}]\n"
     );
-    fs::write(folder.path().join("shot.toml"), scene).unwrap();
+    fs::write(folder.join("shot.toml"), scene).unwrap();
     folder
 }
 
@@ -30,8 +29,7 @@ pub fn grains(folder: &Path, out: &str) -> Vec<(String, Vec<u8>)> {
 fn a_killed_run_resumes_to_the_same_grains() {
     let all = "base_mode = \"delta\"\ngrains = [\"vdb\", \"ply\", \"usd\"]";
     for (written, files) in [("", 10), (all, 31), ("grains_mode = \"delta\"", 10)] {
-        let folder = folder("compression = 0.4", written);
-        let at = folder.path();
+        let at = &folder("compression = 0.4", written);
         works(at, "snow shot.toml -o once -q");
         for frame in [3, 6] {
             kill_at(at, "snow shot.toml -o killed", &format!("killed/state/grains.{frame:04}.json"));
@@ -48,8 +46,7 @@ fn a_killed_run_resumes_to_the_same_grains() {
 
 #[test]
 fn grains_are_a_pass_of_their_own_over_the_base() {
-    let folder = folder("", "");
-    let at = folder.path();
+    let at = &folder("", "");
     works(at, "snow shot.toml -o cache -q --stage base");
     assert!(grains(at, "cache").is_empty());
     works(at, "snow shot.toml -o cache -q --stage grains");
@@ -70,8 +67,7 @@ fn grains_are_a_pass_of_their_own_over_the_base() {
 
 #[test]
 fn a_scene_without_the_table_has_no_grains() {
-    let folder = folder("", "");
-    let at = folder.path();
+    let at = &folder("", "");
     let scene = fs::read_to_string(at.join("shot.toml")).unwrap().replace("[grains]", "");
     fs::write(at.join("plain.toml"), scene).unwrap();
     works(at, "snow plain.toml -o plain -q --frames 1-2");
@@ -84,8 +80,8 @@ fn a_scene_without_the_table_has_no_grains() {
 fn what_grains_cannot_be_made_from_is_said_first() {
     let at = |grains: &str, output: &str, words: &[&str]| {
         let folder = folder(grains, output);
-        fails(folder.path(), "snow shot.toml -o out -q", 2, words);
-        assert!(!folder.path().join("out/base").exists());
+        fails(&folder, "snow shot.toml -o out -q", 2, words);
+        assert!(!folder.join("out/base").exists());
     };
     at("", "half = true", &["half", "grains"]);
     at("", "base = []", &["base", "grains"]);
@@ -104,14 +100,13 @@ fn what_grains_cannot_be_made_from_is_said_first() {
     at("initial = \"gone.ply\"", "", &["gone.ply"]);
     // A frame of the base that is not there.
     let folder = folder("", "");
-    works(folder.path(), "snow shot.toml -o cache -q --stage base --frames 1-10x3");
-    fails(folder.path(), "snow shot.toml -o cache -q --stage grains", 2, &["base"]);
+    works(&folder, "snow shot.toml -o cache -q --stage base --frames 1-10x3");
+    fails(&folder, "snow shot.toml -o cache -q --stage grains", 2, &["base"]);
 }
 
 #[test]
 fn more_grains_than_max_are_refused_before_their_first_frame() {
-    let folder = folder("max = 50\ncompression = 0.0", "");
-    let at = folder.path();
+    let at = &folder("max = 50\ncompression = 0.0", "");
     // With the base made by the same run, and by an earlier one.
     for _ in 0..2 {
         fails(at, "snow shot.toml -o out -q", 2, &["shot.toml", "grains.max = 50", "grains.radius"]);
@@ -129,15 +124,14 @@ fn more_grains_than_max_are_refused_before_their_first_frame() {
 #[test]
 fn where_a_box_takes_grains_away_too_many_end_the_run_with_the_frame() {
     let folder = folder("max = 50\ncompression = 0.0\nkeep_box = [-9, -9, -9, 9, 9, 9]", "");
-    fails(folder.path(), "snow shot.toml -o out -q", 1, &["max = 50", "frame"]);
-    let said = works(folder.path(), "check shot.toml -o out");
+    fails(&folder, "snow shot.toml -o out -q", 1, &["max = 50", "frame"]);
+    let said = works(&folder, "check shot.toml -o out");
     assert!(said.contains("at most about"), "{said}");
 }
 
 #[test]
 fn a_check_says_how_many_grains_the_base_gives() {
-    let folder = folder("compression = 0.4", "");
-    let at = folder.path();
+    let at = &folder("compression = 0.4", "");
     let report = |arguments: &str| -> serde_json::Value {
         serde_json::from_str(&works(at, &format!("check shot.toml --json {arguments}"))).unwrap()
     };
@@ -184,8 +178,7 @@ fn a_check_says_how_many_grains_the_base_gives() {
 
 #[test]
 fn a_preset_fills_in_what_is_left_out() {
-    let folder = folder("preset = \"wet\"\ncompression = 0.4", "");
-    let at = folder.path();
+    let at = &folder("preset = \"wet\"\ncompression = 0.4", "");
     works(at, "snow shot.toml -o out -q --frames 1-3");
     let scene = fs::read_to_string(at.join("out/scene.toml")).unwrap();
     for line in
@@ -201,8 +194,7 @@ fn a_preset_fills_in_what_is_left_out() {
 #[test]
 fn objects_take_snow_or_push_grains_or_both() {
     let born = |role: &str| {
-        let folder = folder("compression = 0.0", "");
-        let at = folder.path();
+        let at = &folder("compression = 0.0", "");
         let scene = fs::read_to_string(at.join("shot.toml")).unwrap() + &format!("role = \"{role}\"\n");
         fs::write(at.join("shot.toml"), scene).unwrap();
         works(at, "snow shot.toml -o out -q");
@@ -218,8 +210,7 @@ fn objects_take_snow_or_push_grains_or_both() {
 
 #[test]
 fn grains_of_a_file_are_there_from_the_start() {
-    let folder = folder("initial = \"drift.ply\"", "");
-    let at = folder.path();
+    let at = &folder("initial = \"drift.ply\"", "");
     let points = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n\
                   property float vx\nproperty float vy\nproperty float vz\nend_header\n0 0.5 0 0 1 0\n0.3 0.9 0.5 0 0 0\n";
     fs::write(at.join("drift.ply"), points).unwrap();

@@ -42,8 +42,7 @@ fn report(at: &Path, out: &str, frame: i32) -> serde_json::Value {
 
 #[test]
 fn mist_is_made_and_made_again_without_touching_base_and_grains() {
-    let folder = folder(GRAINS, MIST);
-    let at = folder.path();
+    let at = &folder(GRAINS, MIST);
     works(at, "snow shot.toml -o out -q");
     assert_eq!(files(at, "out", &["mist"]).len(), 10);
     let last = report(at, "out", 10);
@@ -90,8 +89,7 @@ fn mist_is_made_and_made_again_without_touching_base_and_grains() {
 
 #[test]
 fn a_killed_run_resumes_to_the_same_mist_from_any_number_of_threads() {
-    let folder = folder(GRAINS, &format!("fog = [\"mist\"]\n{MIST}\nturbulence = 3.0\nconfinement = 0.3"));
-    let at = folder.path();
+    let at = &folder(GRAINS, &format!("fog = [\"mist\"]\n{MIST}\nturbulence = 3.0\nconfinement = 0.3"));
     works(at, "snow shot.toml -o once -q --threads 2");
     for frame in [3, 6] {
         kill_at(at, "snow shot.toml -o killed", &format!("killed/state/mist.{frame:04}.json"));
@@ -123,8 +121,7 @@ fn caches_of_changes_give_the_same_mist() {
 
 #[test]
 fn fog_takes_all_three_parts() {
-    let folder = folder(GRAINS, &format!("fog = [\"base\", \"grains\", \"mist\"]\n{MIST}"));
-    let at = folder.path();
+    let at = &folder(GRAINS, &format!("fog = [\"base\", \"grains\", \"mist\"]\n{MIST}"));
     works(at, "snow shot.toml -o out -q");
     let fog = read(&at.join("out/fog/fog.0010.vdb")).unwrap();
     assert_eq!(fog.iter().map(|grid| grid.name()).collect::<Vec<_>>(), ["base", "grains", "mist"]);
@@ -135,8 +132,7 @@ fn fog_takes_all_three_parts() {
 
 #[test]
 fn without_fast_grains_the_mist_is_empty_and_the_log_says_so() {
-    let folder = folder(GRAINS, "[mist]\nfrom_speed = 900.0");
-    let at = folder.path();
+    let at = &folder(GRAINS, "[mist]\nfrom_speed = 900.0");
     let run = frazil(at, "snow shot.toml -o out");
     let said = String::from_utf8_lossy(&run.stderr).into_owned();
     assert!(
@@ -149,8 +145,7 @@ fn without_fast_grains_the_mist_is_empty_and_the_log_says_so() {
 
 #[test]
 fn cells_wider_than_objects_and_objects_wider_than_the_air_work() {
-    let folder = folder(GRAINS, MIST);
-    let at = folder.path();
+    let at = &folder(GRAINS, MIST);
     works(at, "snow shot.toml -o coarse -q --set mist.cell=0.5");
     works(at, "snow shot.toml -o fine -q --frames 1-4 --set mist.cell=0.012");
     // The cube fills everything where its grains rise.
@@ -174,9 +169,9 @@ fn cells_wider_than_objects_and_objects_wider_than_the_air_work() {
 fn what_mist_cannot_be_made_from_is_said_first() {
     let refuses = |output: &str, words: &[&str]| {
         let folder = folder("", output);
-        fails(folder.path(), "snow shot.toml -o out -q", 2, words);
-        fails(folder.path(), "check shot.toml", 2, words);
-        assert!(!folder.path().join("out/base").exists());
+        fails(&folder, "snow shot.toml -o out -q", 2, words);
+        fails(&folder, "check shot.toml", 2, words);
+        assert!(!folder.join("out/base").exists());
     };
     refuses("grains = [\"ply\"]\n[mist]\n", &["grains", "[mist]", "vdb"]);
     refuses("mist = []\nfog = [\"mist\"]\n[mist]\n", &["mist", "fog"]);
@@ -186,8 +181,7 @@ fn what_mist_cannot_be_made_from_is_said_first() {
     refuses("[mist]\nwind = \"none.vdb\"", &["none.vdb"]);
     refuses("[mist]\nhalf_life = 0.0", &["`half_life` in [mist]"]);
     refuses("[mist]\nturbulence_size = 0.05", &["`turbulence_size` in [mist]"]);
-    let folder = folder("", MIST);
-    let at = folder.path();
+    let at = &folder("", MIST);
     let text = fs::read_to_string(at.join("shot.toml")).unwrap().replace("[grains]", "");
     fs::write(at.join("plain.toml"), text).unwrap();
     fails(at, "snow plain.toml -o out -q", 2, &["[grains]"]);
@@ -195,8 +189,7 @@ fn what_mist_cannot_be_made_from_is_said_first() {
 
 #[test]
 fn wind_is_read_from_a_grid() {
-    let folder = folder(GRAINS, MIST);
-    let at = folder.path();
+    let at = &folder(GRAINS, MIST);
     let ctx = frazil::Context::new(frazil::Pool::new(2).unwrap());
     let with = |name: &str, value: [f32; 3]| {
         let mut wind = frazil::vdb::VectorGrid::new(0.5, [0.0; 3]).unwrap();

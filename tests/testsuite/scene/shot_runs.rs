@@ -7,14 +7,13 @@ use std::process::Command;
 use std::time::Duration;
 
 use crate::common::character::output;
-use crate::program::{CUBE, command, fails, kill_at, works};
-use tempfile::TempDir;
+use crate::program::{CUBE, Folder, command, fails, kill_at, works};
 
 /// A folder with a cube that slides through snow for so many frames; `output` stands in the scene's table.
-fn folder(frames: i32, cell: f64, output: &str) -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
-    write_scene(folder.path(), frames, cell, output);
+fn folder(frames: i32, cell: f64, output: &str) -> Folder {
+    let folder = Folder::empty();
+    fs::write(folder.join("cube.obj"), CUBE).unwrap();
+    write_scene(&folder, frames, cell, output);
     folder
 }
 
@@ -55,17 +54,17 @@ fn a_killed_run_resumes_to_the_same_bytes_whatever_is_written() {
         ["", "base_mode = \"delta\"", "half = true", "base = []", "objects = [\"usd\"]\nremoved = []"]
     {
         let folder = folder(12, 0.02, written);
-        works(folder.path(), "snow shot.toml -o once -q");
+        works(&folder, "snow shot.toml -o once -q");
         for frame in [1, 4, 9] {
-            kill_at(folder.path(), "snow shot.toml -o killed", &format!("killed/state/base.{frame:04}.json"));
+            kill_at(&folder, "snow shot.toml -o killed", &format!("killed/state/base.{frame:04}.json"));
             // As when it is killed before it has removed an old state.
-            let state = |frame: i32| folder.path().join(format!("killed/state/base.{frame:04}.vdb"));
+            let state = |frame: i32| folder.join(format!("killed/state/base.{frame:04}.vdb"));
             if frame > 2 && state(frame).exists() {
                 fs::copy(state(frame), state(frame - 2)).unwrap();
             }
         }
-        works(folder.path(), "snow shot.toml -o killed -q --threads 1");
-        let [once, killed] = ["once", "killed"].map(|name| output(&folder.path().join(name)));
+        works(&folder, "snow shot.toml -o killed -q --threads 1");
+        let [once, killed] = ["once", "killed"].map(|name| output(&folder.join(name)));
         assert_eq!(differences(&once, &killed), Vec::<String>::new(), "{written}");
         assert!(once.len() > 12);
     }
@@ -74,15 +73,15 @@ fn a_killed_run_resumes_to_the_same_bytes_whatever_is_written() {
 #[test]
 fn a_second_run_makes_nothing_again() {
     let folder = folder(4, 0.04, "");
-    works(folder.path(), "snow shot.toml -o out -q");
-    let stamp = |name: &str| fs::metadata(folder.path().join(name)).unwrap().modified().unwrap();
+    works(&folder, "snow shot.toml -o out -q");
+    let stamp = |name: &str| fs::metadata(folder.join(name)).unwrap().modified().unwrap();
     let before = stamp("out/base/base.0002.vdb");
-    let said = works(folder.path(), "snow shot.toml -o out");
+    let said = works(&folder, "snow shot.toml -o out");
     assert!(said.contains("4 frames are there, 0 are to be made"), "{said}");
     assert_eq!(before, stamp("out/base/base.0002.vdb"));
     // A frame that is gone is made again, and only that one.
-    fs::remove_file(folder.path().join("out/removed/removed.0003.vdb")).unwrap();
-    let said = works(folder.path(), "snow shot.toml -o out");
+    fs::remove_file(folder.join("out/removed/removed.0003.vdb")).unwrap();
+    let said = works(&folder, "snow shot.toml -o out");
     assert!(said.contains("3 frames are there, 1 are to be made"), "{said}");
     assert_eq!(before, stamp("out/base/base.0002.vdb"));
 }
@@ -90,87 +89,82 @@ fn a_second_run_makes_nothing_again() {
 #[test]
 fn a_shot_may_grow() {
     let folder = folder(8, 0.04, "");
-    works(folder.path(), "snow shot.toml -o whole -q");
-    write_scene(folder.path(), 5, 0.04, "");
-    works(folder.path(), "snow shot.toml -o grown -q");
-    write_scene(folder.path(), 8, 0.04, "");
-    works(folder.path(), "snow shot.toml -o grown -q");
-    let [whole, grown] = ["whole", "grown"].map(|name| output(&folder.path().join(name)));
+    works(&folder, "snow shot.toml -o whole -q");
+    write_scene(&folder, 5, 0.04, "");
+    works(&folder, "snow shot.toml -o grown -q");
+    write_scene(&folder, 8, 0.04, "");
+    works(&folder, "snow shot.toml -o grown -q");
+    let [whole, grown] = ["whole", "grown"].map(|name| output(&folder.join(name)));
     assert_eq!(differences(&whole, &grown), Vec::<String>::new());
 }
 
 #[test]
 fn frames_in_pieces_are_those_of_a_whole_run() {
     let folder = folder(12, 0.04, "");
-    works(folder.path(), "snow shot.toml -o whole -q");
+    works(&folder, "snow shot.toml -o whole -q");
     for frames in ["5-7", "10,12", "1-4", "1-12"] {
-        works(folder.path(), &format!("snow shot.toml -o pieces -q --frames {frames}"));
+        works(&folder, &format!("snow shot.toml -o pieces -q --frames {frames}"));
     }
-    let [whole, pieces] = ["whole", "pieces"].map(|name| output(&folder.path().join(name)));
+    let [whole, pieces] = ["whole", "pieces"].map(|name| output(&folder.join(name)));
     assert_eq!(differences(&whole, &pieces), Vec::<String>::new());
-    fails(
-        folder.path(),
-        "snow shot.toml -o d --set output.base_mode=delta --frames 5-7",
-        2,
-        &["frame 1", "delta"],
-    );
+    fails(&folder, "snow shot.toml -o d --set output.base_mode=delta --frames 5-7", 2, &["frame 1", "delta"]);
 }
 
 #[test]
 fn other_settings_are_refused_by_name_and_from_keeps_what_is_before() {
     let folder = folder(6, 0.04, "");
-    works(folder.path(), "snow shot.toml -o out -q");
-    let before = output(&folder.path().join("out"));
+    works(&folder, "snow shot.toml -o out -q");
+    let before = output(&folder.join("out"));
     let words = ["snow.noise.seed was 0", "object.1.scale was 1.0", "--from N", "another -o"];
     let set = "--set snow.noise.seed=2 --set object.1.scale=1.1";
-    fails(folder.path(), &format!("snow shot.toml -o out {set}"), 2, &words);
-    assert_eq!(differences(&before, &output(&folder.path().join("out"))), Vec::<String>::new());
-    works(folder.path(), &format!("snow shot.toml -o out -q {set} --from 4"));
-    let after = output(&folder.path().join("out"));
+    fails(&folder, &format!("snow shot.toml -o out {set}"), 2, &words);
+    assert_eq!(differences(&before, &output(&folder.join("out"))), Vec::<String>::new());
+    works(&folder, &format!("snow shot.toml -o out -q {set} --from 4"));
+    let after = output(&folder.join("out"));
     for frame in 1..=6 {
         let name = format!("base/base.{frame:04}.vdb");
         assert_eq!(before[&name] == after[&name], frame < 4, "{name}");
     }
     // What was kept stays kept, and what was made continues with the settings that made it.
-    works(folder.path(), &format!("snow shot.toml -o out -q {set}"));
-    fails(folder.path(), "snow shot.toml -o out", 2, &["snow.noise.seed was 2"]);
-    assert_eq!(differences(&after, &output(&folder.path().join("out"))), Vec::<String>::new());
+    works(&folder, &format!("snow shot.toml -o out -q {set}"));
+    fails(&folder, "snow shot.toml -o out", 2, &["snow.noise.seed was 2"]);
+    assert_eq!(differences(&after, &output(&folder.join("out"))), Vec::<String>::new());
     // A kept frame that is gone cannot be made again: its settings are not those of now.
-    let kept = folder.path().join("out/base/base.0003.vdb");
+    let kept = folder.join("out/base/base.0003.vdb");
     let bytes = fs::read(&kept).unwrap();
     fs::remove_file(&kept).unwrap();
-    works(folder.path(), &format!("snow shot.toml -o out -q {set} --frames 4-6"));
-    fails(folder.path(), &format!("snow shot.toml -o out {set}"), 2, &["frame 3", "other settings", "gone"]);
+    works(&folder, &format!("snow shot.toml -o out -q {set} --frames 4-6"));
+    fails(&folder, &format!("snow shot.toml -o out {set}"), 2, &["frame 3", "other settings", "gone"]);
     fs::write(&kept, bytes).unwrap();
-    works(folder.path(), &format!("snow shot.toml -o out -q {set}"));
+    works(&folder, &format!("snow shot.toml -o out -q {set}"));
     let deeper = format!("snow shot.toml -o out {set} --set snow.depth=0.2 --from 3");
-    fails(folder.path(), &deeper, 2, &["--from 3", "another layer", "snow.depth was 0.3"]);
-    assert_eq!(differences(&after, &output(&folder.path().join("out"))), Vec::<String>::new());
-    fails(folder.path(), "snow shot.toml -o new --from 4", 2, &["frame 3", "not there"]);
-    assert!(!folder.path().join("new").exists());
-    fails(folder.path(), "snow shot.toml -o new --from 9", 2, &["--from 9", "1-6"]);
+    fails(&folder, &deeper, 2, &["--from 3", "another layer", "snow.depth was 0.3"]);
+    assert_eq!(differences(&after, &output(&folder.join("out"))), Vec::<String>::new());
+    fails(&folder, "snow shot.toml -o new --from 4", 2, &["frame 3", "not there"]);
+    assert!(!folder.join("new").exists());
+    fails(&folder, "snow shot.toml -o new --from 9", 2, &["--from 9", "1-6"]);
 }
 
 #[test]
 fn from_the_first_frame_starts_anew() {
     let folder = folder(3, 0.04, "");
-    works(folder.path(), "snow shot.toml -o out -q");
-    works(folder.path(), "snow shot.toml -o out -q --set snow.depth=0.25 --from 1");
-    works(folder.path(), "snow shot.toml -o fresh -q --set snow.depth=0.25");
-    let [out, fresh] = ["out", "fresh"].map(|name| output(&folder.path().join(name)));
+    works(&folder, "snow shot.toml -o out -q");
+    works(&folder, "snow shot.toml -o out -q --set snow.depth=0.25 --from 1");
+    works(&folder, "snow shot.toml -o fresh -q --set snow.depth=0.25");
+    let [out, fresh] = ["out", "fresh"].map(|name| output(&folder.join(name)));
     assert_eq!(differences(&out, &fresh), Vec::<String>::new());
 }
 
 #[test]
 fn a_mesh_that_changed_is_noticed_wherever_it_lies() {
     let folder = folder(3, 0.04, "");
-    works(folder.path(), "snow shot.toml -o out -q");
+    works(&folder, "snow shot.toml -o out -q");
     // The same content in another position is the same input.
-    fs::create_dir(folder.path().join("moved")).unwrap();
-    fs::rename(folder.path().join("cube.obj"), folder.path().join("moved/box.obj")).unwrap();
-    works(folder.path(), "snow shot.toml -o out -q --set object.1.file=moved/box.obj");
-    fs::write(folder.path().join("cube.obj"), CUBE.replace(".4", ".5")).unwrap();
-    fails(folder.path(), "snow shot.toml -o out", 2, &["object.1.file had another content"]);
+    fs::create_dir(folder.join("moved")).unwrap();
+    fs::rename(folder.join("cube.obj"), folder.join("moved/box.obj")).unwrap();
+    works(&folder, "snow shot.toml -o out -q --set object.1.file=moved/box.obj");
+    fs::write(folder.join("cube.obj"), CUBE.replace(".4", ".5")).unwrap();
+    fails(&folder, "snow shot.toml -o out", 2, &["object.1.file had another content"]);
 }
 
 #[test]
@@ -178,38 +172,30 @@ fn a_frame_of_a_sequence_that_changed_is_named() {
     let folder = folder(6, 0.04, "");
     let mesh = |frame: i32, top: &str| {
         let text = CUBE.replace(".4", top);
-        fs::write(folder.path().join(format!("body.{frame:04}.obj")), text).unwrap();
+        fs::write(folder.join(format!("body.{frame:04}.obj")), text).unwrap();
     };
     (1..=6).for_each(|frame| mesh(frame, ".4"));
     let set = "--set object.1.file=body.%04d.obj";
-    works(folder.path(), &format!("snow shot.toml -o out -q {set}"));
-    let before = output(&folder.path().join("out"));
+    works(&folder, &format!("snow shot.toml -o out -q {set}"));
+    let before = output(&folder.join("out"));
     mesh(4, ".5");
-    fails(
-        folder.path(),
-        &format!("snow shot.toml -o out {set}"),
-        2,
-        &["body.0004.obj", "frame 4", "--from 4"],
-    );
-    works(folder.path(), &format!("snow shot.toml -o out -q {set} --from 4"));
-    works(folder.path(), &format!("snow shot.toml -o fresh -q {set}"));
-    let [after, fresh] = ["out", "fresh"].map(|name| output(&folder.path().join(name)));
+    fails(&folder, &format!("snow shot.toml -o out {set}"), 2, &["body.0004.obj", "frame 4", "--from 4"]);
+    works(&folder, &format!("snow shot.toml -o out -q {set} --from 4"));
+    works(&folder, &format!("snow shot.toml -o fresh -q {set}"));
+    let [after, fresh] = ["out", "fresh"].map(|name| output(&folder.join(name)));
     let bytes = |tree: &BTreeMap<String, Vec<u8>>| tree["removed/removed.0003.vdb"].clone();
     assert!(bytes(&before) == bytes(&after));
     assert!(before["base/base.0006.vdb"] != after["base/base.0006.vdb"] && fresh.len() == after.len());
-    same_grids(
-        &folder.path().join("out/base/base.0006.vdb"),
-        &folder.path().join("fresh/base/base.0006.vdb"),
-    );
-    fs::remove_file(folder.path().join("body.0005.obj")).unwrap();
-    fails(folder.path(), &format!("snow shot.toml -o out {set}"), 2, &["body.0005.obj", "missing"]);
+    same_grids(&folder.join("out/base/base.0006.vdb"), &folder.join("fresh/base/base.0006.vdb"));
+    fs::remove_file(folder.join("body.0005.obj")).unwrap();
+    fails(&folder, &format!("snow shot.toml -o out {set}"), 2, &["body.0005.obj", "missing"]);
 }
 
 #[test]
 fn damaged_records_and_files_are_named() {
     let folder = folder(4, 0.04, "");
-    works(folder.path(), "snow shot.toml -o out -q");
-    let path = |name: &str| folder.path().join("out").join(name);
+    works(&folder, "snow shot.toml -o out -q");
+    let path = |name: &str| folder.join("out").join(name);
     let manifest = fs::read_to_string(path("state/base.0003.json")).unwrap();
     for (changed, word) in [
         (manifest.replace("\"bytes\"", "\"byte\""), "damaged"),
@@ -218,10 +204,10 @@ fn damaged_records_and_files_are_named() {
         (String::new(), "damaged"),
     ] {
         fs::write(path("state/base.0003.json"), changed).unwrap();
-        fails(folder.path(), "snow shot.toml -o out", 2, &["state/base.0003.json", word]);
+        fails(&folder, "snow shot.toml -o out", 2, &["state/base.0003.json", word]);
     }
     fs::remove_file(path("state/base.0003.json")).unwrap();
-    let said = works(folder.path(), "snow shot.toml -o out");
+    let said = works(&folder, "snow shot.toml -o out");
     assert!(said.contains("3 frames are there, 1 are to be made"), "{said}");
     // The length is right, the content is not: no run resumes from it.
     let mut bytes = fs::read(path("base/base.0003.vdb")).unwrap();
@@ -229,39 +215,38 @@ fn damaged_records_and_files_are_named() {
     bytes[middle] ^= 1;
     fs::write(path("base/base.0003.vdb"), bytes).unwrap();
     fs::remove_file(path("state/base.0004.json")).unwrap();
-    fails(folder.path(), "snow shot.toml -o out", 2, &["base.0003.vdb", "remove it"]);
+    fails(&folder, "snow shot.toml -o out", 2, &["base.0003.vdb", "remove it"]);
     fs::remove_file(path("base/base.0003.vdb")).unwrap();
-    works(folder.path(), "snow shot.toml -o out -q");
-    works(folder.path(), "snow shot.toml -o fresh -q");
-    let [out, fresh] = ["out", "fresh"].map(|name| output(&folder.path().join(name)));
+    works(&folder, "snow shot.toml -o out -q");
+    works(&folder, "snow shot.toml -o fresh -q");
+    let [out, fresh] = ["out", "fresh"].map(|name| output(&folder.join(name)));
     assert_eq!(differences(&out, &fresh), Vec::<String>::new());
     fs::write(path("state/base.json"), "{}").unwrap();
-    fails(folder.path(), "snow shot.toml -o out", 2, &["state/base.json", "damaged"]);
+    fails(&folder, "snow shot.toml -o out", 2, &["state/base.json", "damaged"]);
 }
 
 #[test]
 fn two_runs_do_not_write_into_one_folder() {
     let folder = folder(2000, 0.02, "");
-    let mut child = command(folder.path(), "snow shot.toml -o out -q").spawn().unwrap();
-    while !folder.path().join("out/state/base.0001.json").exists() {
+    let mut child = command(&folder, "snow shot.toml -o out -q").spawn().unwrap();
+    while !folder.join("out/state/base.0001.json").exists() {
         std::thread::sleep(Duration::from_millis(2));
     }
-    fails(folder.path(), "snow shot.toml -o out", 75, &["another run", "out"]);
+    fails(&folder, "snow shot.toml -o out", 75, &["another run", "out"]);
     child.kill().unwrap();
     child.wait().unwrap();
     // A dead run holds nothing.
-    works(folder.path(), "snow shot.toml -o out -q --frames 1-2");
+    works(&folder, "snow shot.toml -o out -q --frames 1-2");
 }
 
 #[test]
 fn no_space_ends_the_run_and_space_lets_it_resume() {
     let folder = folder(12, 0.02, "base_mode = \"delta\"");
     // Files may grow to what the first frames need: a later one, larger, finds no space.
-    works(folder.path(), "snow shot.toml -o once -q");
-    let size = |frame: i32| {
-        fs::metadata(folder.path().join(format!("once/base/base.{frame:04}.vdb"))).unwrap().len()
-    };
-    works(folder.path(), "snow shot.toml -o full -q --frames 1-2");
+    works(&folder, "snow shot.toml -o once -q");
+    let size =
+        |frame: i32| fs::metadata(folder.join(format!("once/base/base.{frame:04}.vdb"))).unwrap().len();
+    works(&folder, "snow shot.toml -o full -q --frames 1-2");
     let blocks = (3..=12).map(size).max().unwrap() / 512 - 2;
     let script = format!("ulimit -f {blocks}; exec \"$0\" snow shot.toml -o full -q");
     let mut shell = Command::new("sh");
@@ -270,64 +255,63 @@ fn no_space_ends_the_run_and_space_lets_it_resume() {
     let said = String::from_utf8_lossy(&stopped.stderr);
     assert_eq!(stopped.status.code(), Some(1), "{said}");
     assert!(said.contains("cannot write"), "{said}");
-    works(folder.path(), "snow shot.toml -o full -q");
-    let [once, full] = ["once", "full"].map(|name| output(&folder.path().join(name)));
+    works(&folder, "snow shot.toml -o full -q");
+    let [once, full] = ["once", "full"].map(|name| output(&folder.join(name)));
     assert_eq!(differences(&once, &full), Vec::<String>::new());
 }
 
 #[test]
 fn whole_frames_are_rebuilt_from_changes() {
     let folder = folder(6, 0.04, "base_mode = \"delta\"");
-    works(folder.path(), "snow shot.toml -o delta -q");
-    works(folder.path(), "snow shot.toml -o full -q --set output.base_mode=full");
-    works(folder.path(), "vdb rebuild delta --frame 1-6 -o rebuilt.%04d.vdb");
-    works(folder.path(), "vdb rebuild delta --frame 5 -o five.vdb");
+    works(&folder, "snow shot.toml -o delta -q");
+    works(&folder, "snow shot.toml -o full -q --set output.base_mode=full");
+    works(&folder, "vdb rebuild delta --frame 1-6 -o rebuilt.%04d.vdb");
+    works(&folder, "vdb rebuild delta --frame 5 -o five.vdb");
     for frame in 1..=6 {
-        let rebuilt = folder.path().join(format!("rebuilt.{frame:04}.vdb"));
-        same_grids(&rebuilt, &folder.path().join(format!("full/base/base.{frame:04}.vdb")));
+        let rebuilt = folder.join(format!("rebuilt.{frame:04}.vdb"));
+        same_grids(&rebuilt, &folder.join(format!("full/base/base.{frame:04}.vdb")));
     }
-    let [five, rebuilt] =
-        ["five.vdb", "rebuilt.0005.vdb"].map(|name| fs::read(folder.path().join(name)).unwrap());
+    let [five, rebuilt] = ["five.vdb", "rebuilt.0005.vdb"].map(|name| fs::read(folder.join(name)).unwrap());
     assert!(five == rebuilt);
-    fails(folder.path(), "vdb rebuild delta --frame 9 -o nine.vdb", 2, &["frame 9", "not there"]);
-    fails(folder.path(), "vdb rebuild delta --frame 1-2 -o two.vdb", 2, &["pattern"]);
-    fails(folder.path(), "vdb rebuild nowhere --frame 1 -o one.vdb", 2, &["nowhere"]);
+    fails(&folder, "vdb rebuild delta --frame 9 -o nine.vdb", 2, &["frame 9", "not there"]);
+    fails(&folder, "vdb rebuild delta --frame 1-2 -o two.vdb", 2, &["pattern"]);
+    fails(&folder, "vdb rebuild nowhere --frame 1 -o one.vdb", 2, &["nowhere"]);
 }
 
 #[test]
 fn a_preview_has_coarser_cells_and_a_folder_of_its_own() {
     let folder = folder(2, 0.02, "");
-    works(folder.path(), "snow shot.toml -o out -q");
-    fails(folder.path(), "snow shot.toml -o out --preview 3", 2, &["snow.cell was 0.02"]);
-    works(folder.path(), "snow shot.toml -o look -q --preview 3");
-    let look = fs::read_to_string(folder.path().join("look/scene.toml")).unwrap();
+    works(&folder, "snow shot.toml -o out -q");
+    fails(&folder, "snow shot.toml -o out --preview 3", 2, &["snow.cell was 0.02"]);
+    works(&folder, "snow shot.toml -o look -q --preview 3");
+    let look = fs::read_to_string(folder.join("look/scene.toml")).unwrap();
     assert!(look.contains("cell = 0.06"), "{look}");
-    works(folder.path(), "vdb from-mesh cube.obj --cell 0.02 -o layer.vdb");
+    works(&folder, "vdb from-mesh cube.obj --cell 0.02 -o layer.vdb");
     let layer = "[shot]\nframes = \"1-2\"\n[snow]\ntop = \"layer.vdb\"\ncell = 0.02\n";
-    fs::write(folder.path().join("layer.toml"), layer).unwrap();
-    fails(folder.path(), "snow layer.toml -o x --preview 2", 2, &["layer.vdb", "preview"]);
+    fs::write(folder.join("layer.toml"), layer).unwrap();
+    fails(&folder, "snow layer.toml -o x --preview 2", 2, &["layer.vdb", "preview"]);
 }
 
 #[test]
 fn the_resolved_scene_of_overrides_makes_the_same_again() {
     let folder = folder(3, 0.04, "");
-    works(folder.path(), "snow shot.toml -o out -q --set snow.noise.amplitude=0.03 --set shot.fps=30");
-    works(folder.path(), "snow out/scene.toml -o again -q");
-    let [out, again] = ["out", "again"].map(|name| output(&folder.path().join(name)));
+    works(&folder, "snow shot.toml -o out -q --set snow.noise.amplitude=0.03 --set shot.fps=30");
+    works(&folder, "snow out/scene.toml -o again -q");
+    let [out, again] = ["out", "again"].map(|name| output(&folder.join(name)));
     assert_eq!(differences(&out, &again), Vec::<String>::new());
 }
 
 #[test]
 fn shot_usda_names_every_file_by_a_relative_path() {
     let folder = folder(3, 0.04, "objects = [\"usd\"]");
-    works(folder.path(), "snow shot.toml -o out -q");
-    let stage = fs::read_to_string(folder.path().join("out/shot.usda")).unwrap();
+    works(&folder, "snow shot.toml -o out -q");
+    let stage = fs::read_to_string(folder.join("out/shot.usda")).unwrap();
     let assets: Vec<&str> = stage.split('@').skip(1).step_by(2).collect();
     assert!(assets.len() > 9, "{stage}");
     for asset in assets {
-        assert!(asset.starts_with("./") && folder.path().join("out").join(asset).is_file(), "{asset}");
+        assert!(asset.starts_with("./") && folder.join("out").join(asset).is_file(), "{asset}");
     }
-    let clip = fs::read_to_string(folder.path().join("out/objects/objects.0002.usda")).unwrap();
+    let clip = fs::read_to_string(folder.join("out/objects/objects.0002.usda")).unwrap();
     // 0.9 m along z in 11 frames of 1/24 s; corners turn besides, so look at their mean.
     let velocities = clip.split("velocities.timeSamples = { 2: [").nth(1).unwrap().split(']').next().unwrap();
     let numbers: Vec<f64> = velocities

@@ -22,8 +22,7 @@ const OTHERS: [(&str, &str); 10] = [
 
 #[test]
 fn grains_are_not_made_on_the_base_of_another_scene() {
-    let folder = folder("", "");
-    let at = folder.path();
+    let at = &folder("", "");
     fs::write(at.join("other.obj"), CUBE.replace(".4", ".3")).unwrap();
     works(at, "snow shot.toml -o cache -q --stage base");
     let refused = |from: &str| {
@@ -57,8 +56,7 @@ fn grains_are_not_made_on_the_base_of_another_scene() {
 
 #[test]
 fn grains_are_not_made_on_the_base_of_another_sequence() {
-    let folder = folder("", "");
-    let at = folder.path();
+    let at = &folder("", "");
     let mesh = |frame: i32, top: &str| {
         fs::write(at.join(format!("body.{frame:04}.obj")), CUBE.replace(".4", top)).unwrap();
     };

@@ -35,8 +35,7 @@ fn written(folder: &Path, out: &str, kinds: &[&str]) -> Vec<std::time::SystemTim
 
 #[test]
 fn volumes_are_made_and_made_again_without_touching_base_and_grains() {
-    let folder = folder(GRAINS, ALL);
-    let at = folder.path();
+    let at = &folder(GRAINS, ALL);
     works(at, "snow shot.toml -o out -q");
     assert_eq!(files(at, "out", &["fog", "snow"]).len(), 20);
     // One more: what the clips have in common.
@@ -88,8 +87,7 @@ fn caches_of_changes_give_the_same_volumes() {
 
 #[test]
 fn a_killed_run_resumes_to_the_same_volumes_from_any_number_of_threads() {
-    let folder = folder(GRAINS, ALL);
-    let at = folder.path();
+    let at = &folder(GRAINS, ALL);
     works(at, "snow shot.toml -o once -q --threads 2");
     kill_at(at, "snow shot.toml -o killed", "killed/state/volumes.0004.json");
     works(at, "snow shot.toml -o killed -q --threads 1");
@@ -99,8 +97,7 @@ fn a_killed_run_resumes_to_the_same_volumes_from_any_number_of_threads() {
 
 #[test]
 fn shot_usda_has_volumes_with_materials() {
-    let folder = folder(GRAINS, &format!("grains = [\"vdb\", \"usd\"]\nobjects = [\"usd\"]\n{ALL}"));
-    let at = folder.path();
+    let at = &folder(GRAINS, &format!("grains = [\"vdb\", \"usd\"]\nobjects = [\"usd\"]\n{ALL}"));
     works(at, "snow shot.toml -o out -q");
     let stage = fs::read_to_string(at.join("out/shot.usda")).unwrap();
     let assets: Vec<&str> = stage.split('@').skip(1).step_by(2).collect();
@@ -134,9 +131,9 @@ fn shot_usda_has_volumes_with_materials() {
 fn what_volumes_cannot_be_made_from_is_said_first() {
     let at = |output: &str, words: &[&str]| {
         let folder = folder("", output);
-        fails(folder.path(), "snow shot.toml -o out -q", 2, words);
-        fails(folder.path(), "check shot.toml", 2, words);
-        assert!(!folder.path().join("out/base").exists());
+        fails(&folder, "snow shot.toml -o out -q", 2, words);
+        fails(&folder, "check shot.toml", 2, words);
+        assert!(!folder.join("out/base").exists());
     };
     at("fog = [\"smoke\"]", &["fog", "smoke"]);
     at("fog = true", &["fog"]);
@@ -146,21 +143,21 @@ fn what_volumes_cannot_be_made_from_is_said_first() {
     at("mesh = [\"obj\"]", &["mesh", "obj"]);
     // Without grains, which need the base too.
     let folder = folder("", "");
-    let text = fs::read_to_string(folder.path().join("shot.toml")).unwrap().replace("[grains]", "");
+    let text = fs::read_to_string(folder.join("shot.toml")).unwrap().replace("[grains]", "");
     let plain = |output: &str, words: &[&str]| {
-        fs::write(folder.path().join("plain.toml"), text.replace("[output]", &format!("[output]\n{output}")))
+        fs::write(folder.join("plain.toml"), text.replace("[output]", &format!("[output]\n{output}")))
             .unwrap();
-        fails(folder.path(), "snow plain.toml -o out -q", 2, words);
+        fails(&folder, "snow plain.toml -o out -q", 2, words);
     };
     plain("fog = [\"grains\"]", &["fog", "[grains]"]);
     plain("fog = [\"base\"]\nhalf = true", &["half", "fog"]);
     plain("snow = true\nbase = []", &["base", "snow"]);
     plain("mesh = [\"ply\"]\nbase = []", &["base", "mesh"]);
     // The surface of snow without grains is the base's.
-    fs::write(folder.path().join("plain.toml"), text.replace("[output]", "[output]\nsnow = true")).unwrap();
-    works(folder.path(), "snow plain.toml -o plain -q --frames 1-2");
+    fs::write(folder.join("plain.toml"), text.replace("[output]", "[output]\nsnow = true")).unwrap();
+    works(&folder, "snow plain.toml -o plain -q --frames 1-2");
     let surface = |name: &str| {
-        let grids = read(&folder.path().join("plain").join(name)).unwrap();
+        let grids = read(&folder.join("plain").join(name)).unwrap();
         let surface = grids.iter().find(|grid| grid.name() == "surface").unwrap();
         to_bytes(&[surface], &Default::default()).unwrap()
     };
@@ -169,8 +166,7 @@ fn what_volumes_cannot_be_made_from_is_said_first() {
 
 #[test]
 fn a_check_and_the_limit_of_memory_know_the_volumes() {
-    let folder = folder(GRAINS, "");
-    let at = folder.path();
+    let at = &folder(GRAINS, "");
     let report = |set: &str| -> serde_json::Value {
         serde_json::from_str(&works(at, &format!("check shot.toml --json {set}"))).unwrap()
     };

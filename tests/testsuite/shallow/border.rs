@@ -1,12 +1,12 @@
 //! What lies beyond the border.
 
-use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
+use frazil::shallow::columns::grid::Grid;
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::TimeStepping;
 use frazil::shallow::pipes::Border;
-use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
 
+use crate::common::flowing::{DOWN, Frames, stacked};
 use crate::common::shallow::context;
 
 const CELLS: usize = 100;
@@ -15,9 +15,7 @@ const DEPTH: f64 = 0.02;
 /// A pond of 1 cm cells over level ground.
 fn pond(border: Border) -> Shallow {
     let grid = Grid { cell: 0.01, origin: [-0.5, -0.5], size: [CELLS, CELLS] };
-    let heights = Heights::between(-0.1, 0.1).unwrap();
-    let solids =
-        Solids::new(grid, heights, (0..grid.cells()).map(|_| vec![[BOTTOMLESS, heights.round(0.0)]]));
+    let solids = stacked(grid, [-0.1, 0.1], |_| vec![[DOWN, 0.0]]);
     let params = Params {
         liquid: Liquid::new(0.0),
         kept: 1.0,
@@ -54,9 +52,7 @@ fn waves_leave_over_an_absorbing_border_and_come_back_from_a_wall() {
         let mut pond = pond(border);
         raise(&mut pond);
         // A wave takes 1.1 s from the middle to the border: it has left after 1.8, and what came back would be in the middle after 2.3.
-        for _ in 0..23 {
-            pond.step(&context(), 0.1).unwrap();
-        }
+        pond.frames(&context(), 0.1, 23);
         assert_eq!(pond.balance().error, 0);
         roughness(&pond)
     });
@@ -67,9 +63,7 @@ fn waves_leave_over_an_absorbing_border_and_come_back_from_a_wall() {
 fn liquid_at_rest_stays_inside_of_an_absorbing_border() {
     let mut pond = pond(Border::Absorbing);
     let before = pond.depths().to_vec();
-    for _ in 0..10 {
-        pond.step(&context(), 0.1).unwrap();
-    }
+    pond.frames(&context(), 0.1, 10);
     assert!(pond.depths() == before);
     assert_eq!([pond.balance().lost, pond.balance().gained], [0.0; 2]);
 }
@@ -84,9 +78,7 @@ fn what_is_taken_comes_back_over_an_absorbing_border_also_from_a_saved_state() {
     again.fill(3.0 * DEPTH);
     again.restore(&pond.save()).unwrap();
     for pond in [&mut pond, &mut again] {
-        for _ in 0..100 {
-            pond.step(&context(), 0.1).unwrap();
-        }
+        pond.frames(&context(), 0.1, 100);
         let balance = pond.balance();
         assert_eq!(balance.error, 0);
         assert!(balance.gained > 0.9 * 0.5 * DEPTH && roughness(pond) < 0.02 * DEPTH, "{balance:?}");

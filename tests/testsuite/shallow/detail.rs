@@ -2,7 +2,6 @@
 
 use frazil::Context;
 use frazil::Pool;
-use frazil::shallow::columns::grid::BOTTOMLESS;
 use frazil::shallow::free_fall::Falls;
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::TimeStepping;
@@ -11,9 +10,8 @@ use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::{Detail, Params, Shallow};
 
 use crate::common::bodies::Dice;
-use crate::common::shallow::{Turn, context, floors, ground, waves};
-
-const FRAME: f64 = 1.0 / 60.0;
+use crate::common::flowing::{FRAME, Frames, four_points, near_cells, point, turned_box};
+use crate::common::shallow::{Plan, Turn, context, floors, ground, waves};
 
 /// Depths (m) that columns of the lowest layer have along x, averaged over some rows (fine cells): of each fine or coarse cell its middle (m) and
 /// depth.
@@ -69,22 +67,10 @@ fn nothing_is_lost_while_the_near_cells_move() {
         let params = Params { border, pace, ..Params::default() };
         let mut detail = Detail::new(&ctx, &solids, params, [10..30, 8..24]).unwrap();
         detail.fill(0.001);
-        let point = |kind, at| FlowPoint { kind, at, radius: 0.003, rate: 3e-6, pulse: None };
-        let points = [
-            point(Kind::Source, [0.0, 0.01, 0.0]),
-            point(Kind::Source, [-0.02, 0.01, 0.012]),
-            point(Kind::Drain, [0.02, 0.0, -0.01]),
-            point(Kind::Absorber(2e-7), [0.0, 0.0, 0.015]),
-        ];
-        detail.set_flows(&points, |at| format!("point {at}")).unwrap();
+        detail.set_flows(&four_points([0.02, 0.015]), |at| format!("point {at}")).unwrap();
         for frame in 0..600 {
             if frame % 3 == 0 {
-                let range = |dice: &mut Dice, count: usize| {
-                    let first = 2 * dice.below(count / 2);
-                    first..first + 2 + 2 * dice.below((count - first) / 2)
-                };
-                let near = [range(&mut dice, 60), range(&mut dice, 44)];
-                detail.set_near(near).unwrap();
+                detail.set_near(near_cells(&mut dice, [60, 44])).unwrap();
                 assert_eq!(detail.balance().error, 0, "round {round}, frame {frame}: {:?}", detail.near());
             }
             detail.step(&ctx, FRAME).unwrap();
@@ -125,9 +111,7 @@ fn a_lake_at_rest_stays_level_to_a_unit() {
                 }
             }
         }
-        for _ in 0..120 {
-            detail.step(&ctx, FRAME).unwrap();
-        }
+        detail.frames(&ctx, FRAME, 120);
         let [low, high] = surfaces(&detail);
         assert!(low >= level - 100 && high <= level + 100, "rest {rest}: {low} to {high} of {level}");
         let off = all(&detail) / inside - 1.0;
@@ -145,7 +129,7 @@ fn film(slope: f64, near: [std::ops::Range<usize>; 2]) -> (Detail, f64) {
     let discharge = 1e-5;
     let point = |row: usize, x: f64, kind: Kind, rate: f64| {
         let at = [x, 0.03 - x * slope, -0.008 + 0.001 * (row as f64 + 0.5)];
-        FlowPoint { kind, at, radius: 0.00036, rate, pulse: None }
+        self::point(kind, at, 0.00036, rate)
     };
     let sources = (0..16).map(|row| point(row, -0.0395, Kind::Source, discharge * 0.001));
     let drains = (0..16).map(|row| point(row, 0.0395, Kind::Drain, 1e-3));
@@ -161,9 +145,7 @@ fn a_film_crosses_the_edge_both_ways() {
     let ctx = context();
     for slope in [0.1, 0.5] {
         let (mut detail, theory) = film(slope, [60..100, 0..32]);
-        for _ in 0..480 {
-            detail.step(&ctx, FRAME).unwrap();
-        }
+        detail.frames(&ctx, FRAME, 480);
         let profile = profile(&detail, 0..32);
         let mut worst: f64 = 0.0;
         for [x, depth] in profile.iter().filter(|[x, _]| x.abs() < 0.025) {
@@ -179,9 +161,7 @@ fn a_film_crosses_the_edge_both_ways() {
 fn a_film_runs_along_the_edge() {
     let ctx = context();
     let (mut detail, theory) = film(0.3, [0..160, 8..24]);
-    for _ in 0..480 {
-        detail.step(&ctx, FRAME).unwrap();
-    }
+    detail.frames(&ctx, FRAME, 480);
     let mut worst: f64 = 0.0;
     for row in (4..28).step_by(2) {
         for [_, depth] in profile(&detail, row..row + 2).iter().filter(|[x, _]| x.abs() < 0.025) {
@@ -213,9 +193,7 @@ fn hump(near: [std::ops::Range<usize>; 2], frames: usize) -> Vec<[f64; 2]> {
             detail.pour_at(position, 0.0012, high * 4e-6).unwrap();
         }
     }
-    for _ in 0..frames {
-        detail.step(&ctx, FRAME).unwrap();
-    }
+    detail.frames(&ctx, FRAME, frames);
     profile(&detail, 0..8).into_iter().map(|[x, deep]| [x, deep - depth]).collect()
 }
 
@@ -240,25 +218,13 @@ fn turned_and_mirrored_scenes_are_the_same() {
     let ctx = context();
     let size = [48, 32];
     let cell = 1.0 / 1024.0;
-    let height = |x: usize, z: usize| 0.02 + 1e-4 * ((x * 13 + z * 7) % 17) as f64 + 2e-4 * x as f64;
+    let plan = Plan::new(size, cell, [0.0, 0.125], |at| {
+        let [x, z] = [0, 1].map(|axis| (at[axis] / cell + 0.5 * size[axis] as f64) as usize);
+        vec![[0.0, 0.02 + 1e-4 * ((x * 13 + z * 7) % 17) as f64 + 2e-4 * x as f64]]
+    });
     let run = |turn: Turn| {
-        let turned = turn.size(size);
-        let grid = frazil::shallow::columns::grid::Grid {
-            cell,
-            origin: turned.map(|count| -0.5 * count as f64 * cell),
-            size: turned,
-        };
-        let heights = frazil::shallow::columns::grid::Heights::between(0.0, 0.125).unwrap();
-        let mut cells = vec![Vec::new(); grid.cells()];
-        for index in 0..size[0] * size[1] {
-            let [x, z] = [index % size[0], index / size[0]];
-            cells[grid.index(turn.cell([x, z], size))] = vec![[BOTTOMLESS, heights.round(height(x, z))]];
-        }
-        let solids = frazil::shallow::terrain::Solids::new(grid, heights, cells);
-        let near = |[a, b]: [[usize; 2]; 2]| {
-            let ends = [turn.cell(a, size), turn.cell([b[0] - 1, b[1] - 1], size)];
-            [0, 1].map(|axis| ends[0][axis].min(ends[1][axis])..ends[0][axis].max(ends[1][axis]) + 1)
-        };
+        let solids = plan.solids(turn);
+        let near = |cells: [[usize; 2]; 2]| turned_box(turn, cells, size);
         let params = Params { border: Border::Open, ..Params::default() };
         let mut detail = Detail::new(&ctx, &solids, params, near([[6, 6], [20, 18]])).unwrap();
         detail.fill(0.026);

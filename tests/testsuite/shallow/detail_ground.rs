@@ -3,34 +3,24 @@
 use frazil::geometry::DVec3;
 use frazil::shallow::params::{Friction, TimeStepping};
 use frazil::shallow::pipes::Border;
-use frazil::shallow::sources::{FlowPoint, Kind};
+use frazil::shallow::sources::FlowPoint;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::terrain::shapes::Shape;
 use frazil::shallow::{Detail, Params, Shallow};
 
-use crate::common::shallow::{context, floors, ground, violations, waves};
+use crate::common::flowing::{FRAME, Frames, bridged, four_points};
+use crate::common::shallow::{context, floors, ground, violations};
 
-const FRAME: f64 = 1.0 / 60.0;
 const CELL: f64 = 0.001;
 const SIZE: [usize; 2] = [48, 36];
 
 /// Rough ground, and a bridge.
 fn terrain(phase: f64) -> Solids {
-    floors(SIZE, CELL, [-0.02, 0.1], 2, |at @ [x, z], floor| {
-        let lift = 1e-3 * libm::sin(phase + 80.0 * x);
-        let top = 0.012 * floor as f64 + 2e-3 * waves(at, CELL) + lift;
-        (floor == 0 || x.abs() < 0.006 && z.abs() < 0.012).then_some([top - 0.003, top])
-    })
+    bridged(SIZE, |x| 1e-3 * libm::sin(phase + 80.0 * x))
 }
 
 fn points() -> Vec<FlowPoint> {
-    let point = |kind, at| FlowPoint { kind, at, radius: 0.003, rate: 3e-6, pulse: None };
-    vec![
-        point(Kind::Source, [0.0, 0.01, 0.0]),
-        point(Kind::Source, [-0.02, 0.01, 0.012]),
-        point(Kind::Drain, [0.02, 0.0, -0.01]),
-        point(Kind::Absorber(2e-7), [0.0, 0.0, 0.015]),
-    ]
+    four_points([0.02, 0.015])
 }
 
 /// Nothing is missing, no column is over its brim, and there is as much as before but for what flow points have moved.
@@ -143,9 +133,7 @@ fn a_tool_crosses_the_edge_and_pushes_the_liquid() {
         }
     }
     detail.set_bodies(&[]).unwrap();
-    for _ in 0..200 {
-        detail.step(&ctx, FRAME).unwrap();
-    }
+    detail.frames(&ctx, FRAME, 200);
     check(&detail, poured, "without the tool");
     // But for what makes no coarse unit.
     assert!(detail.balance().held < 1e-8 * poured, "{:?}", detail.balance());
@@ -279,9 +267,7 @@ fn what_waits_for_room_stays_where_the_near_cells_move() {
         assert_eq!((detail.balance().held, detail.balance().lost), (held, 0.0), "{near:?}");
     }
     detail.set_bodies(&[]).unwrap();
-    for _ in 0..400 {
-        detail.step(&ctx, FRAME).unwrap();
-    }
+    detail.frames(&ctx, FRAME, 400);
     check(&detail, poured, "at the end");
     assert_eq!(detail.balance().lost, 0.0);
 }

@@ -1,7 +1,6 @@
 //! What liquid in cells of two sizes carries: none of it is lost, what is uniform stays so, and states have it.
 
 use frazil::geometry::DVec3;
-use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::params::TimeStepping;
 use frazil::shallow::pipes::Border;
 use frazil::shallow::sources::{FlowPoint, Kind};
@@ -10,17 +9,14 @@ use frazil::shallow::terrain::shapes::Shape;
 use frazil::shallow::{Detail, Law, Params, Scalar, Shallow};
 
 use crate::common::bodies::Dice;
-use crate::common::shallow::{Turn, context, floors, ground, waves};
+use crate::common::flowing::{FRAME, bridged, four_points, near_cells, point, turned_box};
+use crate::common::shallow::{Plan, Turn, context, ground, waves};
 
-const FRAME: f64 = 1.0 / 60.0;
 const CELL: f64 = 0.001;
 const SIZE: [usize; 2] = [48, 36];
 
 fn terrain(phase: f64) -> Solids {
-    floors(SIZE, CELL, [-0.02, 0.1], 2, |at @ [x, z], floor| {
-        let top = 0.012 * floor as f64 + 2e-3 * waves(at, CELL) + 1e-3 * libm::sin(phase + 80.0 * x);
-        (floor == 0 || x.abs() < 0.006 && z.abs() < 0.012).then_some([top - 0.003, top])
-    })
+    bridged(SIZE, |x| 1e-3 * libm::sin(phase + 80.0 * x))
 }
 
 fn scalars() -> Vec<Scalar> {
@@ -34,13 +30,7 @@ fn scalars() -> Vec<Scalar> {
 }
 
 fn points() -> Vec<FlowPoint> {
-    let point = |kind, at| FlowPoint { kind, at, radius: 0.003, rate: 3e-6, pulse: None };
-    vec![
-        point(Kind::Source, [0.0, 0.01, 0.0]),
-        point(Kind::Source, [-0.02, 0.01, 0.012]),
-        point(Kind::Drain, [0.02, 0.0, -0.01]),
-        point(Kind::Absorber(2e-7), [0.0, 0.0, 0.015]),
-    ]
+    four_points([0.02, 0.015])
 }
 
 fn scene(border: Border, near: [std::ops::Range<usize>; 2]) -> Detail {
@@ -83,12 +73,7 @@ fn nothing_of_a_scalar_is_lost() {
         for frame in 0..240 {
             let what = format!("{border:?}, frame {frame}");
             if frame % 3 == 0 {
-                let mut range = |count: usize| {
-                    let first = 2 * dice.below(count / 2);
-                    first..first + 2 + 2 * dice.below((count - first) / 2)
-                };
-                let near = [range(SIZE[0]), range(SIZE[1])];
-                detail.set_near(near).unwrap();
+                detail.set_near(near_cells(&mut dice, SIZE)).unwrap();
                 check(&detail, &what);
             }
             if frame > 60 {
@@ -140,13 +125,7 @@ fn dye_crosses_the_edge() {
     let solids = ground([80, 16], CELL, [-0.05, 0.1], |[x, _]| 0.03 - 0.3 * x);
     let mut detail = Detail::new(&ctx, &solids, Params::default(), [30..50, 0..16]).unwrap();
     detail.set_scalars(&[Scalar::dye("dye")]).unwrap();
-    let source = |z: f64| FlowPoint {
-        kind: Kind::Source,
-        at: [-0.038, 0.042, z],
-        radius: 0.0015,
-        rate: 1e-6,
-        pulse: None,
-    };
+    let source = |z: f64| point(Kind::Source, [-0.038, 0.042, z], 0.0015, 1e-6);
     let sources: Vec<FlowPoint> = (0..8).map(|at| source(-0.007 + 0.002 * f64::from(at))).collect();
     detail.set_flows(&sources, |at| format!("point {at}")).unwrap();
     (0..8).for_each(|at| detail.set_sourced(at, &[0.5]).unwrap());
@@ -205,22 +184,14 @@ fn all_near_is_a_plain_liquid_and_states_have_what_is_carried() {
 fn turned_and_mirrored_dye_is_the_same() {
     let ctx = context();
     let (size, cell) = ([32, 24], 1.0 / 1024.0);
+    let plan = Plan::new(size, cell, [0.0, 0.125], |at| {
+        let [x, z] = [0, 1].map(|axis| (at[axis] / cell + 0.5 * size[axis] as f64) as usize);
+        vec![[0.0, 0.02 + 1e-4 * ((x * 13 + z * 7) % 17) as f64 + 2e-4 * x as f64]]
+    });
     let run = |turn: Turn| {
-        let turned = turn.size(size);
-        let origin = turned.map(|count| -0.5 * count as f64 * cell);
-        let grid = Grid { cell, origin, size: turned };
-        let heights = Heights::between(0.0, 0.125).unwrap();
-        let mut cells = vec![Vec::new(); grid.cells()];
-        for index in 0..size[0] * size[1] {
-            let [x, z] = [index % size[0], index / size[0]];
-            let top = 0.02 + 1e-4 * ((x * 13 + z * 7) % 17) as f64 + 2e-4 * x as f64;
-            cells[grid.index(turn.cell([x, z], size))] = vec![[BOTTOMLESS, heights.round(top)]];
-        }
-        let near = |[a, b]: [[usize; 2]; 2]| {
-            let ends = [turn.cell(a, size), turn.cell([b[0] - 1, b[1] - 1], size)];
-            [0, 1].map(|axis| ends[0][axis].min(ends[1][axis])..ends[0][axis].max(ends[1][axis]) + 1)
-        };
-        let solids = Solids::new(grid, heights, cells);
+        let solids = plan.solids(turn);
+        let origin = solids.grid.origin;
+        let near = |cells: [[usize; 2]; 2]| turned_box(turn, cells, size);
         let mut detail = Detail::new(&ctx, &solids, Params::default(), near([[6, 6], [16, 14]])).unwrap();
         detail.set_scalars(&[Scalar::dye("dye")]).unwrap();
         for (position, level) in [([10.0, 10.0], 0.9), ([20.0, 8.0], 0.1)] {

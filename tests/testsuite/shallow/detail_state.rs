@@ -5,34 +5,22 @@ use std::ops::Range;
 use frazil::geometry::DVec3;
 use frazil::shallow::params::TimeStepping;
 use frazil::shallow::pipes::Border;
-use frazil::shallow::sources::{FlowPoint, Kind};
+use frazil::shallow::sources::FlowPoint;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::terrain::shapes::Shape;
 use frazil::shallow::{Detail, Params};
 use frazil::{Context, Error, Pool};
-use xxhash_rust::xxh3::xxh3_128;
 
 use crate::common::bodies::Dice;
-use crate::common::shallow::{context, floors, waves};
-
-const FRAME: f64 = 1.0 / 60.0;
-const CELL: f64 = 0.001;
+use crate::common::flowing::{FRAME, Frames, bridged, damaged, four_points, seal};
+use crate::common::shallow::context;
 
 fn terrain(phase: f64) -> Solids {
-    floors([40, 30], CELL, [-0.02, 0.1], 2, |at @ [x, z], floor| {
-        let top = 0.012 * floor as f64 + 2e-3 * waves(at, CELL) + 1e-3 * phase * x;
-        (floor == 0 || x.abs() < 0.006 && z.abs() < 0.012).then_some([top - 0.003, top])
-    })
+    bridged([40, 30], |x| 1e-3 * phase * x)
 }
 
 fn points() -> Vec<FlowPoint> {
-    let point = |kind, at| FlowPoint { kind, at, radius: 0.003, rate: 3e-6, pulse: None };
-    vec![
-        point(Kind::Source, [0.0, 0.01, 0.0]),
-        point(Kind::Source, [-0.015, 0.01, 0.012]),
-        point(Kind::Drain, [0.015, 0.0, -0.01]),
-        point(Kind::Absorber(2e-7), [0.0, 0.0, 0.012]),
-    ]
+    four_points([0.015, 0.012])
 }
 
 const NEAR: [Range<usize>; 2] = [12..28, 8..20];
@@ -48,12 +36,6 @@ fn scene(ctx: &Context, phase: f64, params: &Params, near: [Range<usize>; 2]) ->
 
 fn params(border: Border) -> Params {
     Params { border, pace: TimeStepping::Realtime(0.003), ..Params::default() }
-}
-
-fn run(detail: &mut Detail, ctx: &Context, frames: usize) {
-    for _ in 0..frames {
-        detail.step(ctx, FRAME).unwrap();
-    }
 }
 
 #[test]
@@ -119,7 +101,7 @@ fn any_number_of_threads_saves_the_same_bytes() {
     let saved = |threads: usize| {
         let ctx = Context::new(Pool::new(threads).unwrap());
         let mut detail = scene(&ctx, 0.0, &params(Border::Open), NEAR);
-        run(&mut detail, &ctx, 5);
+        detail.frames(&ctx, FRAME, 5);
         detail.save()
     };
     assert!(saved(0) == saved(2));
@@ -130,12 +112,6 @@ fn refusal(detail: &mut Detail, bytes: &[u8]) -> String {
     let Err(Error::Bytes(what)) = detail.restore(bytes) else { panic!("it was not refused as bytes") };
     assert!(detail.save() == before, "{what}");
     what
-}
-
-/// The hash at the end put right.
-fn seal(bytes: &mut [u8]) {
-    let (body, seal) = bytes.split_at_mut(bytes.len() - 16);
-    seal.copy_from_slice(&xxh3_128(body).to_le_bytes());
 }
 
 #[test]
@@ -175,36 +151,16 @@ fn a_state_of_something_else_is_refused_with_a_sentence() {
     detail.restore(&saved).unwrap();
 }
 
-/// A state with some of its bytes changed, or cut.
-fn damaged(saved: &[u8], dice: &mut Dice) -> Vec<u8> {
-    let mut bytes = saved.to_vec();
-    if dice.one_in(4) {
-        bytes.truncate(dice.below(saved.len()));
-        return bytes;
-    }
-    for _ in 0..=dice.below(3) {
-        let end = if dice.one_in(2) { 1200 } else { saved.len() };
-        let at = dice.below(end.min(saved.len()));
-        bytes[at] = match dice.below(4) {
-            0 => 0,
-            1 => 255,
-            2 => bytes[at] ^ 1 << dice.below(8),
-            _ => dice.below(256) as u8,
-        };
-    }
-    bytes
-}
-
 #[test]
 fn damaged_states_are_refused_or_flow() {
     let ctx = context();
     let mut detail = scene(&ctx, 0.0, &params(Border::Open), NEAR);
-    run(&mut detail, &ctx, 10);
+    detail.frames(&ctx, FRAME, 10);
     let saved = detail.save();
     let mut dice = Dice(17);
     let mut flowed = 0;
     for turn in 0..10_000 {
-        let mut bytes = damaged(&saved, &mut dice);
+        let mut bytes = damaged(&saved, 1200, &mut dice);
         // Half of them with the right hash.
         let is_sealed = turn % 2 == 1 && bytes.len() > 16;
         if is_sealed {

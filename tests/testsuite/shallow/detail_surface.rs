@@ -11,9 +11,9 @@ use frazil::shallow::two_level::surface::{Surface, bound};
 use frazil::shallow::{Detail, Params};
 use frazil::{Context, Pool};
 
+use crate::common::flowing::FRAME;
 use crate::common::shallow::{context, floors, ground, waves};
 
-const FRAME: f64 = 1.0 / 60.0;
 const CELL: f64 = 1.0 / 1024.0;
 
 /// A mesh in metres.

@@ -1,7 +1,6 @@
 //! Liquid that falls freely: where it goes, where it lands, and that none of it is lost on the way.
 
 use frazil::geometry::DVec3;
-use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::free_fall::mesh::{Balls, Target, bound};
 use frazil::shallow::free_fall::{Droplet, Falls};
 use frazil::shallow::material::Liquid;
@@ -15,23 +14,13 @@ use frazil::shallow::{Params, Shallow, Snapshot};
 use frazil::{Context, Pool};
 
 use crate::common::bodies::Dice;
+use crate::common::flowing::{DOWN, FRAME, Frames, from_corner, point, pour_each, stacked};
 use crate::common::shallow::{Turn, context, turnable};
 
-const FRAME: f64 = 1.0 / 60.0;
 const G: f64 = 9.81;
 
-/// Solids (m) at a cell; the first one reaches down for ever if it begins at -1.
 fn solids(size: [usize; 2], cell: f64, high: f64, at: impl Fn([usize; 2]) -> Vec<[f64; 2]>) -> Solids {
-    let heights = Heights::between(0.0, high).unwrap();
-    let grid = Grid { cell, origin: [0.0; 2], size };
-    let solid =
-        |[low, top]: [f64; 2]| [if low < 0.0 { BOTTOMLESS } else { heights.round(low) }, heights.round(top)];
-    let cells = (0..grid.cells()).map(|index| at([index % size[0], index / size[0]]));
-    Solids::new(
-        grid,
-        heights,
-        cells.map(|cell| cell.into_iter().map(solid).collect::<Vec<_>>()).collect::<Vec<_>>(),
-    )
+    stacked(from_corner(cell, size), [0.0, high], at)
 }
 
 fn params(falls: Falls) -> Params {
@@ -39,14 +28,14 @@ fn params(falls: Falls) -> Params {
 }
 
 fn source(at: [f64; 3], rate: f64) -> FlowPoint {
-    FlowPoint { kind: Kind::Source, at, radius: 0.003, rate, pulse: None }
+    point(Kind::Source, at, 0.003, rate)
 }
 
 const CELL: f64 = 0.005;
 
 /// A table, half a metre high, from the west to x = 0.1 m, and a source on it.
 fn table(ctx: &Context, falls: Falls) -> Shallow {
-    let ground = solids([80, 9], CELL, 1.0, |[x, _]| vec![[-1.0, if x < 20 { 0.55 } else { 0.05 }]]);
+    let ground = solids([80, 9], CELL, 1.0, |[x, _]| vec![[DOWN, if x < 20 { 0.55 } else { 0.05 }]]);
     let mut liquid = Shallow::new(ctx, &ground, params(falls)).unwrap();
     liquid.set_flows(&[source([0.06, 0.55, 0.0225], 5e-6)], |_| "the source".into()).unwrap();
     liquid
@@ -119,7 +108,7 @@ fn what_is_in_the_air_is_in_the_balance_until_it_has_landed() {
 
 /// Ground, and a floor above it with a hole of 4 x 4 cells.
 fn floors(size: [usize; 2], hole: impl Fn([usize; 2]) -> bool) -> Solids {
-    solids(size, 0.002, 0.3, |at| if hole(at) { vec![[-1.0, 0.01]] } else { vec![[-1.0, 0.01], [0.2, 0.21]] })
+    solids(size, 0.002, 0.3, |at| if hole(at) { vec![[DOWN, 0.01]] } else { vec![[DOWN, 0.01], [0.2, 0.21]] })
 }
 
 fn in_hole([x, z]: [usize; 2]) -> bool {
@@ -220,7 +209,7 @@ fn fast_liquid_does_not_pass_through_a_thin_floor() {
     let sheet = |[x, z]: [usize; 2]| (20..24).contains(&x) && (10..14).contains(&z);
     for ledge in [false, true] {
         let ground = solids([40, 24], 0.002, 6.0, |at| {
-            let mut cell = vec![[-1.0, 0.1]];
+            let mut cell = vec![[DOWN, 0.1]];
             if !ledge || sheet(at) {
                 cell.push([0.5, 0.500_001]);
             }
@@ -289,9 +278,7 @@ fn liquid_waits_at_its_lip_until_it_is_a_drop() {
     assert!(large > 100 && small * 20 < large, "{large} {small}");
     // When the source has run dry the last ones wait half a second, and fall.
     liquid.set_rate(0, 0.0).unwrap();
-    for _ in 0..600 {
-        liquid.step(&ctx, FRAME).unwrap();
-    }
+    liquid.frames(&ctx, FRAME, 600);
     assert!(liquid.drops().len() > 0 && liquid.balance().falling < 3.0 * drop, "{:?}", liquid.balance());
 }
 
@@ -300,17 +287,12 @@ fn any_number_of_threads_and_a_restored_liquid_make_the_same_bytes() {
     let run = |threads: usize, frames: usize| {
         let ctx = Context::new(Pool::new(threads).unwrap());
         let ground = solids([340, 320], 0.002, 0.3, |[x, z]| {
-            if (x / 20 + z / 3) % 3 == 0 { vec![[-1.0, 0.01 + 1e-5 * x as f64]] } else { vec![[-1.0, 0.15]] }
+            if (x / 20 + z / 3) % 3 == 0 { vec![[DOWN, 0.01 + 1e-5 * x as f64]] } else { vec![[DOWN, 0.15]] }
         });
         let mut liquid =
             Shallow::new(&ctx, &ground, params(Falls { most: 1 << 16, ..Falls::default() })).unwrap();
-        for index in liquid.columns().indices().collect::<Vec<_>>() {
-            let [x, z] = liquid.columns().cell(index);
-            liquid.pour(index, 0.0001 * ((x * x + 5 * z) % 23) as f64);
-        }
-        for _ in 0..frames {
-            liquid.step(&ctx, FRAME).unwrap();
-        }
+        pour_each(&mut liquid, |[x, z]| 0.0001 * ((x * x + 5 * z) % 23) as f64);
+        liquid.frames(&ctx, FRAME, frames);
         (liquid, ctx)
     };
     let (mut alone, ctx) = run(0, 6);
@@ -334,11 +316,9 @@ fn any_number_of_threads_and_a_restored_liquid_make_the_same_bytes() {
 fn a_state_of_other_falls_is_refused() {
     let ctx = context();
     let mut liquid = table(&ctx, Falls::default());
-    for _ in 0..60 {
-        liquid.step(&ctx, FRAME).unwrap();
-    }
+    liquid.frames(&ctx, FRAME, 60);
     let saved = liquid.save();
-    let ground = solids([80, 9], CELL, 1.0, |[x, _]| vec![[-1.0, if x < 20 { 0.55 } else { 0.05 }]]);
+    let ground = solids([80, 9], CELL, 1.0, |[x, _]| vec![[DOWN, if x < 20 { 0.55 } else { 0.05 }]]);
     let others =
         [None, Some(Falls { most: 3, ..Falls::default() }), Some(Falls { height: 0.7, ..Falls::default() })];
     for falls in others {
@@ -363,18 +343,16 @@ fn a_state_of_other_falls_is_refused() {
 #[test]
 fn a_turned_or_mirrored_scene_has_the_same_falls() {
     let ctx = context();
-    let turns: Vec<Turn> = Turn::TURNS.iter().chain(&Turn::MIRRORS).copied().collect();
     let mut flown = 0;
     for seed in 0..30 {
         let mut plan = turnable(seed);
         plan.params.falls = Some(Falls { height: 0.001, drop: 0.0, most: 400, ..Falls::default() });
-        let mut liquids: Vec<Shallow> =
-            [Turn::NONE].iter().chain(&turns).map(|turn| plan.make(&ctx, *turn)).collect();
+        let mut liquids = Turn::ALL.map(|turn| plan.make(&ctx, turn));
         for frame in 0..12 {
             let mut dice = Dice(seed << 32 | frame);
             let corners = [(); 2].map(|()| plan.size.map(|count| dice.below(count)));
-            let all = liquids.iter_mut().zip([Turn::NONE].iter().chain(&turns)).map(|(liquid, turn)| {
-                plan.pour(liquid, *turn, corners, [-1.0, 1e-4, 1e-3][dice.below(3)]);
+            let all = liquids.iter_mut().zip(Turn::ALL).map(|(liquid, turn)| {
+                plan.pour(liquid, turn, corners, [-1.0, 1e-4, 1e-3][dice.below(3)]);
                 dice = Dice(seed << 32 | frame);
                 let _ = [(); 2].map(|()| plan.size.map(|count| dice.below(count)));
                 liquid.step(&ctx, FRAME).unwrap();
@@ -385,7 +363,7 @@ fn a_turned_or_mirrored_scene_has_the_same_falls() {
                     .map(|drop| [drop.position[1].to_bits(), drop.volume.to_bits(), drop.age.to_bits()])
                     .collect();
                 drops.sort_unstable();
-                (plan.depths_of(liquid, *turn), drops, balance.falling.to_bits(), balance.lost.to_bits())
+                (plan.depths_of(liquid, turn), drops, balance.falling.to_bits(), balance.lost.to_bits())
             });
             let all: Vec<_> = all.collect();
             flown += all[0].1.len();
@@ -410,17 +388,15 @@ fn terrain_that_moves_under_falls_loses_nothing() {
             move |[x, z]: [usize; 2]| {
                 let within = (low[0]..low[0] + 12).contains(&x) && (low[1]..low[1] + 12).contains(&z);
                 match (within, is_void) {
-                    (false, _) => vec![[-1.0, 0.01], [0.1, 0.11]],
+                    (false, _) => vec![[DOWN, 0.01], [0.1, 0.11]],
                     (true, true) => vec![],
-                    (true, false) => vec![[-1.0, height]],
+                    (true, false) => vec![[DOWN, height]],
                 }
             }
         };
         let ground = solids([40, 30], 0.002, 0.3, shape(&mut dice));
         let mut liquid = Shallow::new(&ctx, &ground, params).unwrap();
-        for index in liquid.columns().indices().collect::<Vec<_>>() {
-            liquid.pour(index, dice.between(0.0, 0.004));
-        }
+        pour_each(&mut liquid, |_| dice.between(0.0, 0.004));
         let mut flown = 0;
         for frame in 0..60 {
             if frame % 7 == 0 {
@@ -440,9 +416,7 @@ fn terrain_that_moves_under_falls_loses_nothing() {
 fn drops_and_strands_are_a_mesh_in_buffers_of_known_capacity() {
     let ctx = context();
     let mut liquid = table(&ctx, Falls::default());
-    for _ in 0..60 {
-        liquid.step(&ctx, FRAME).unwrap();
-    }
+    liquid.frames(&ctx, FRAME, 60);
     let mut seen = Snapshot::new(&table(&ctx, Falls::default()));
     seen.take(&liquid);
     let drops = seen.drops().to_vec();

@@ -1,16 +1,13 @@
 //! What falls freely carries its scalars with it: none of them is lost in the air, and they land with the liquid.
 
-use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::free_fall::Falls;
 use frazil::shallow::sources::Kind;
-use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Law, Params, Scalar, Shallow};
 use frazil::{Context, Pool};
 
 use crate::common::bodies::Dice;
+use crate::common::flowing::{DOWN, FRAME, Frames, from_corner, stacked};
 use crate::common::shallow::{Plan, Turn, context, source, turnable};
-
-const FRAME: f64 = 1.0 / 60.0;
 
 /// A dye, an age, and a warmth that goes.
 fn three() -> [Scalar; 3] {
@@ -40,18 +37,17 @@ fn carrying(ctx: &Context, plan: &Plan, turn: Turn) -> Shallow {
 #[test]
 fn a_turned_or_mirrored_scene_carries_the_same_through_the_air() {
     let ctx = context();
-    let turns: Vec<Turn> = [Turn::NONE].iter().chain(&Turn::TURNS).chain(&Turn::MIRRORS).copied().collect();
     let mut flown = 0.0;
     for seed in 0..30 {
         let plan = falling(seed);
-        let mut liquids: Vec<Shallow> = turns.iter().map(|turn| carrying(&ctx, &plan, *turn)).collect();
+        let mut liquids = Turn::ALL.map(|turn| carrying(&ctx, &plan, turn));
         for frame in 0..12 {
-            let all = liquids.iter_mut().zip(&turns).map(|(liquid, turn)| {
+            let all = liquids.iter_mut().zip(Turn::ALL).map(|(liquid, turn)| {
                 let mut dice = Dice(seed << 32 | frame);
                 let poured = [dice.between(-0.5, 0.75), dice.between(0.0, 3.0), 20.0];
                 liquid.set_poured(&poured).unwrap();
                 let corners = [(); 2].map(|()| plan.size.map(|count| dice.below(count)));
-                plan.pour(liquid, *turn, corners, [-1.0, 1e-4, 1e-3][dice.below(3)]);
+                plan.pour(liquid, turn, corners, [-1.0, 1e-4, 1e-3][dice.below(3)]);
                 liquid.step(&ctx, FRAME).unwrap();
                 let balances = [0, 1, 2].map(|scalar| liquid.scalar_balance(scalar).unwrap());
                 for balance in &balances {
@@ -65,7 +61,7 @@ fn a_turned_or_mirrored_scene_carries_the_same_through_the_air() {
                     })
                     .collect();
                 drops.sort_unstable();
-                (plan.depths_of(liquid, *turn), drops, balances)
+                (plan.depths_of(liquid, turn), drops, balances)
             });
             let all: Vec<_> = all.collect();
             flown += all[0].2[0].falling.abs();
@@ -77,13 +73,9 @@ fn a_turned_or_mirrored_scene_carries_the_same_through_the_air() {
 
 /// A shelf over a floor, and a source on it; what falls takes 0.2 s.
 fn shelf(ctx: &Context, most: usize) -> Shallow {
-    let heights = Heights::between(0.0, 0.4).unwrap();
-    let grid = Grid { cell: 0.004, origin: [0.0; 2], size: [40, 12] };
-    let solid = |index: usize| {
-        let top = if index % 40 < 20 { 0.25 } else { 0.05 };
-        vec![[BOTTOMLESS, heights.round(top)]]
-    };
-    let solids = Solids::new(grid, heights, (0..grid.cells()).map(solid));
+    let solids = stacked(from_corner(0.004, [40, 12]), [0.0, 0.4], |[x, _]| {
+        vec![[DOWN, if x < 20 { 0.25 } else { 0.05 }]]
+    });
     let falls = Falls { drop: 0.0, most, ..Falls::default() };
     let mut liquid = Shallow::new(ctx, &solids, Params { falls: Some(falls), ..Params::default() }).unwrap();
     liquid.set_flows(&[source([0.06, 0.25, 0.024], 0.004, 5e-6)], |_| "the source".into()).unwrap();
@@ -96,9 +88,7 @@ fn shelf(ctx: &Context, most: usize) -> Shallow {
 fn drops_have_the_concentration_of_what_they_come_from_and_age_in_the_air() {
     let ctx = context();
     let mut liquid = shelf(&ctx, 8192);
-    for _ in 0..120 {
-        liquid.step(&ctx, FRAME).unwrap();
-    }
+    liquid.frames(&ctx, FRAME, 120);
     assert!(liquid.drops().len() > 100);
     let mut oldest = 0.0_f64;
     for drop in liquid.drops() {
@@ -122,14 +112,9 @@ fn drops_have_the_concentration_of_what_they_come_from_and_age_in_the_air() {
 fn a_restored_liquid_and_any_number_of_threads_carry_the_same_through_the_air() {
     let run = |threads: usize, frames: usize| {
         let ctx = Context::new(Pool::new(threads).unwrap());
-        let heights = Heights::between(0.0, 0.3).unwrap();
-        let grid = Grid { cell: 0.002, origin: [0.0; 2], size: [340, 320] };
-        let solid = |index: usize| {
-            let [x, z] = [index % 340, index / 340];
-            let top = if (x / 20 + z / 3) % 3 == 0 { 0.01 + 1e-5 * x as f64 } else { 0.15 };
-            vec![[BOTTOMLESS, heights.round(top)]]
-        };
-        let solids = Solids::new(grid, heights, (0..grid.cells()).map(solid));
+        let solids = stacked(from_corner(0.002, [340, 320]), [0.0, 0.3], |[x, z]| {
+            vec![[DOWN, if (x / 20 + z / 3) % 3 == 0 { 0.01 + 1e-5 * x as f64 } else { 0.15 }]]
+        });
         let falls = Falls { most: 1 << 16, ..Falls::default() };
         let mut liquid =
             Shallow::new(&ctx, &solids, Params { falls: Some(falls), ..Params::default() }).unwrap();
@@ -139,9 +124,7 @@ fn a_restored_liquid_and_any_number_of_threads_carry_the_same_through_the_air() 
             liquid.set_poured(&[0.001 * ((3 * x + z) % 700) as f64, 0.0, 5.0]).unwrap();
             liquid.pour(index, 0.0001 * ((x * x + 5 * z) % 23) as f64);
         }
-        for _ in 0..frames {
-            liquid.step(&ctx, FRAME).unwrap();
-        }
+        liquid.frames(&ctx, FRAME, frames);
         (liquid, ctx)
     };
     let (mut alone, ctx) = run(0, 6);

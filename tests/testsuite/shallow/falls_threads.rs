@@ -3,12 +3,12 @@
 use frazil::shallow::free_fall::mesh::{Balls, bound};
 use frazil::shallow::free_fall::{Droplet, Falls};
 use frazil::shallow::material::Liquid;
-use frazil::shallow::sources::{FlowPoint, Kind};
+use frazil::shallow::sources::Kind;
 use frazil::shallow::{Params, Shallow};
 
+use crate::common::flowing::{FRAME, point};
 use crate::common::shallow::{context, ground};
 
-const FRAME: f64 = 1.0 / 60.0;
 const CELL: f64 = 0.001;
 /// Where the edge is, and its height over the ground (m).
 const EDGE: f64 = 0.0;
@@ -21,8 +21,7 @@ fn over_an_edge(rate: f64, frames: usize, falls: Falls) -> Shallow {
     let params = Params { liquid: Liquid::new(1e-6), falls: Some(falls), ..Params::default() };
     let mut liquid = Shallow::new(&ctx, &solids, params).unwrap();
     let at = [-0.012, 0.01 + HEIGHT, 0.0032];
-    let source = FlowPoint { kind: Kind::Source, at, radius: 0.004, rate, pulse: None };
-    liquid.set_flows(&[source], |_| "the source".into()).unwrap();
+    liquid.set_flows(&[point(Kind::Source, at, 0.004, rate)], |_| "the source".into()).unwrap();
     for _ in 0..frames {
         liquid.step(&ctx, FRAME).unwrap();
         assert_eq!(liquid.balance().error, 0);

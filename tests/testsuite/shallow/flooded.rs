@@ -1,11 +1,13 @@
 //! Passages that are full up to their ceiling.
 
-use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
+use frazil::shallow::columns::grid::{BOTTOMLESS, Heights};
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::TimeStepping;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
-use frazil::{Context, Pool};
+
+use crate::common::flowing::{DOWN, Frames, from_corner, stacked};
+use crate::common::shallow::context;
 
 /// Edge of a cell (m).
 const CELL: f64 = 0.005;
@@ -14,31 +16,18 @@ const HIGH: f64 = 0.01;
 /// Cells of the passage between two legs of one cell.
 const LONG: usize = 12;
 
-fn context() -> Context {
-    Context::new(Pool::new(0).unwrap())
-}
-
 /// Two legs that a passage joins below, in one row; filled to these levels (m).
 fn u_tube(levels: [f64; 2], params: Params) -> Shallow {
-    let grid = Grid { cell: CELL, origin: [0.0; 2], size: [LONG + 2, 1] };
-    let heights = Heights::between(-0.01, 0.3).unwrap();
-    let cell = |x: usize| {
-        let mut solids = vec![[BOTTOMLESS, heights.round(0.0)]];
+    let solids = stacked(from_corner(CELL, [LONG + 2, 1]), [-0.01, 0.3], |[x, _]| {
+        let mut solids = vec![[DOWN, 0.0]];
         if (1..=LONG).contains(&x) {
-            solids.push([heights.round(HIGH), heights.round(0.25)]);
+            solids.push([HIGH, 0.25]);
         }
         solids
-    };
-    let mut tube =
-        Shallow::new(&context(), &Solids::new(grid, heights, (0..LONG + 2).map(cell)), params).unwrap();
+    });
+    let mut tube = Shallow::new(&context(), &solids, params).unwrap();
     for x in 0..LONG + 2 {
-        let depth = if x == 0 {
-            levels[0]
-        } else if x == LONG + 1 {
-            levels[1]
-        } else {
-            HIGH
-        };
+        let depth = [levels[0], HIGH, levels[1]][usize::from(x > 0) + usize::from(x > LONG)];
         let column = tube.columns().column([x, 0], 0).unwrap();
         tube.pour(column, depth);
     }
@@ -80,9 +69,7 @@ fn a_u_tube_swings_with_the_period_of_its_passage() {
 #[test]
 fn legs_come_to_one_level_and_the_passage_stays_full() {
     let mut tube = u_tube([0.06, 0.04], Params { kept: 0.01, liquid: Liquid::WATER, ..params() });
-    for _ in 0..20 {
-        tube.step(&context(), 1.0).unwrap();
-    }
+    tube.frames(&context(), 1.0, 20);
     assert!(difference(&tube).abs() < 5e-7, "{}", difference(&tube));
     let heights = tube.columns().heights;
     for x in 1..=LONG {
@@ -96,7 +83,7 @@ fn legs_come_to_one_level_and_the_passage_stays_full() {
 #[test]
 fn a_passage_without_an_end_lets_nothing_in() {
     // All is full: no head moves anything.
-    let grid = Grid { cell: CELL, origin: [0.0; 2], size: [8, 3] };
+    let grid = from_corner(CELL, [8, 3]);
     let heights = Heights::between(0.0, 0.1).unwrap();
     let solids = Solids::new(grid, heights, (0..24).map(|_| vec![[BOTTOMLESS, 1000], [900_000, 1_000_000]]));
     let mut cave = Shallow::new(&context(), &solids, params()).unwrap();
@@ -105,15 +92,11 @@ fn a_passage_without_an_end_lets_nothing_in() {
         assert!(cave.pour(column, 1.0) > 0.0);
     }
     let before = cave.depths().to_vec();
-    for _ in 0..20 {
-        cave.step(&context(), 0.01).unwrap();
-    }
+    cave.frames(&context(), 0.01, 20);
     assert!(before == cave.depths(), "it moved");
     // A gap in it is shared out, to the unit.
     let taken = cave.pour(lower[0], -0.00002);
     assert!(taken < 0.0);
-    for _ in 0..50 {
-        cave.step(&context(), 0.01).unwrap();
-    }
+    cave.frames(&context(), 0.01, 50);
     assert_eq!(cave.balance().error, 0);
 }

@@ -1,20 +1,17 @@
 //! The flow: nothing is lost, depths stay within their columns, and the same scene makes the same liquid however it lies.
 
-use std::process::Command;
-
+use frazil::shallow::Params;
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::TimeStepping;
 use frazil::shallow::pipes::Border;
 use frazil::shallow::sources::{FlowPoint, Kind};
-use frazil::shallow::{Params, Shallow};
 use frazil::{Context, Pool};
 
 use crate::common::bodies::Dice;
+use crate::common::flowing::{FRAME, Frames, assert_same_depths, at_all_levels};
 use crate::common::shallow::{
     Turn, busy, context, covered, extreme, extreme_frame, ground, hash, source, turnable, violations,
 };
-
-const FRAME: f64 = 1.0 / 60.0;
 
 #[test]
 fn no_unit_is_lost_while_liquid_comes_and_goes() {
@@ -63,28 +60,24 @@ fn depths_stay_within_their_columns_whatever_is_asked() {
 #[test]
 fn a_scene_that_is_turned_or_mirrored_flows_the_same() {
     let ctx = context();
-    let turns: Vec<Turn> = [Turn::NONE].into_iter().chain(Turn::TURNS).chain(Turn::MIRRORS).collect();
     let (mut links, mut worked) = (0, [0; 2]);
     for seed in 0..12 {
         let plan = turnable(seed);
         links += plan.links();
-        let mut liquids: Vec<Shallow> = turns.iter().map(|turn| plan.make(&ctx, *turn)).collect();
+        let mut liquids = Turn::ALL.map(|turn| plan.make(&ctx, turn));
         for frame in 0..10 {
             let mut dice = Dice(seed << 32 | frame);
             let corners = [(); 2].map(|()| plan.size.map(|count| dice.below(count)));
             // Strips fall asleep where all is taken, which lie otherwise when the scene is turned.
             let depth = [-1.0, -1.0, 1e-4, 0.0][dice.below(4)];
             let mut depths = Vec::new();
-            for (liquid, turn) in liquids.iter_mut().zip(&turns) {
-                plan.pour(liquid, *turn, corners, depth);
+            for (liquid, turn) in liquids.iter_mut().zip(Turn::ALL) {
+                plan.pour(liquid, turn, corners, depth);
                 let report = liquid.step(&ctx, FRAME).unwrap();
                 worked = [worked[0] + report.emptied, worked[1] + report.filled];
-                depths.push(plan.depths_of(liquid, *turn));
+                depths.push(plan.depths_of(liquid, turn));
             }
-            for (turn, turned) in turns.iter().zip(&depths) {
-                let differ = turned.iter().zip(&depths[0]).filter(|(a, b)| a != b).count();
-                assert_eq!(differ, 0, "scene {seed}, frame {frame}, {turn:?}: columns that differ");
-            }
+            assert_same_depths(&depths, &format!("scene {seed}, frame {frame}"));
         }
     }
     assert!(links > 0 && worked[0] > 0 && worked[1] > 0, "{links} links, {worked:?} rows scaled");
@@ -114,9 +107,7 @@ fn more_threads_make_the_same_liquid() {
     let hashes = [0, 1, 2, 3].map(|threads| {
         let ctx = Context::new(Pool::new(threads).unwrap());
         let mut liquid = plan.make(&ctx, Turn::NONE);
-        for _ in 0..8 {
-            liquid.step(&ctx, FRAME).unwrap();
-        }
+        liquid.frames(&ctx, FRAME, 8);
         hash(&liquid)
     });
     assert_eq!(hashes, [hashes[0]; 4]);
@@ -130,15 +121,9 @@ fn all_instruction_sets_make_the_same_liquid() {
     if std::env::var_os(PRINTS).is_some() {
         return print_hashes();
     }
-    let liquids = ["baseline", "avx2", "avx512"].map(|level| {
-        let mut run = Command::new(std::env::current_exe().unwrap());
-        run.args(["--exact", "shallow::flow::all_instruction_sets_make_the_same_liquid", "--nocapture"]);
-        let output = run.env("FRAZIL_CPU", level).env(PRINTS, "1").output().unwrap();
-        let text = String::from_utf8(output.stdout).unwrap();
-        text.lines().filter(|line| line.starts_with("liquid ")).map(str::to_string).collect::<Vec<_>>()
-    });
+    let liquids = at_all_levels("shallow::flow::all_instruction_sets_make_the_same_liquid", PRINTS);
     assert_eq!(liquids[0].len(), 12);
-    assert_eq!(liquids, [liquids[0].clone(), liquids[0].clone(), liquids[0].clone()]);
+    assert_eq!([&liquids[1], &liquids[2]], [&liquids[0]; 2]);
 }
 
 fn print_hashes() {
@@ -147,9 +132,7 @@ fn print_hashes() {
     println!();
     for seed in 0..12 {
         let mut liquid = turnable(seed).make(&ctx, Turn::NONE);
-        for _ in 0..10 {
-            liquid.step(&ctx, FRAME).unwrap();
-        }
+        liquid.frames(&ctx, FRAME, 10);
         println!("liquid {seed} {:016x}", hash(&liquid));
     }
 }
@@ -206,9 +189,7 @@ fn a_hole_in_the_ground_drains_as_torricelli_says() {
         let params = Params { liquid: Liquid::WATER, pace: TimeStepping::Exact, ..Params::default() };
         let mut liquid = covered(&ctx, &solids, params, |_, _| 0.02);
         liquid.set_flows(&[point], |_| "the hole".into()).unwrap();
-        (0..(time / FRAME) as usize).for_each(|_| {
-            liquid.step(&ctx, FRAME).unwrap();
-        });
+        liquid.frames(&ctx, FRAME, (time / FRAME) as usize);
         assert_eq!(liquid.balance().error, 0);
         liquid.balance().drained
     };
@@ -229,9 +210,7 @@ fn a_lake_at_rest_stays_as_it_is_to_the_last_unit() {
     let mut liquid = covered(&ctx, &solids, Params::default(), |_, _| 0.0);
     liquid.fill(0.015);
     let before = liquid.depths().to_vec();
-    for _ in 0..30 {
-        liquid.step(&ctx, FRAME).unwrap();
-    }
+    liquid.frames(&ctx, FRAME, 30);
     let differ = liquid.depths().iter().zip(&before).filter(|(a, b)| a != b).count();
     let dry = liquid.columns().indices().filter(|&column| before[column] == 0).count();
     assert!(dry > 0 && dry < liquid.columns().count(), "there are islands in it");
@@ -248,9 +227,7 @@ fn a_film_of_a_few_units_is_not_frozen() {
     let mut liquid = covered(&ctx, &solids, params, |_, _| 1e-6);
     let top = liquid.columns().column([0, 1], 0).unwrap();
     let first = liquid.depths()[top];
-    for _ in 0..120 {
-        liquid.step(&ctx, FRAME).unwrap();
-    }
+    liquid.frames(&ctx, FRAME, 120);
     // u H t / dx of Nusselt's film, on that slope.
     let nu = Liquid::BLOOD.viscosity;
     let flux = 9.81 * 0.5 * 1e-18 / (3.0 * nu) / 1.25f64.powi(2);

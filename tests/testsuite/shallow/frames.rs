@@ -3,15 +3,13 @@
 use std::time::{Duration, Instant};
 
 use frazil::Context;
-use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::TimeStepping;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Detail, Params, Shallow};
 
+use crate::common::flowing::{DOWN, FRAME, Frames, from_corner, stacked};
 use crate::common::shallow::{context, covered, ground, source, waves};
-
-const FRAME: f64 = 1.0 / 60.0;
 
 fn exact() -> Params {
     Params { pace: TimeStepping::Exact, ..Params::default() }
@@ -140,14 +138,11 @@ fn lengths_that_move_nothing_are_refused() {
 
 /// A cavity of one cell under a lid, walls around it, and room above.
 fn cavity(is_shut: bool) -> Solids {
-    let grid = Grid { cell: 0.001, origin: [0.0; 2], size: [5, 5] };
-    let heights = Heights::between(-0.01, 0.2).unwrap();
-    let solids = |index: usize| match (index == 12, is_shut) {
-        (true, true) => vec![[BOTTOMLESS, heights.round(0.0)], [heights.round(0.001), heights.round(0.01)]],
-        (true, false) => vec![[BOTTOMLESS, heights.round(0.0)]],
-        (false, _) => vec![[BOTTOMLESS, heights.round(0.01)]],
-    };
-    Solids::new(grid, heights, (0..grid.cells()).map(solids))
+    stacked(from_corner(0.001, [5, 5]), [-0.01, 0.2], |cell| match (cell == [2, 2], is_shut) {
+        (true, true) => vec![[DOWN, 0.0], [0.001, 0.01]],
+        (true, false) => vec![[DOWN, 0.0]],
+        (false, _) => vec![[DOWN, 0.01]],
+    })
 }
 
 #[test]
@@ -178,14 +173,10 @@ fn a_source_in_a_cavity_that_is_full_owes_nothing() {
     }
     // A rate that is turned off has nothing left to give, either.
     liquid.update_terrain(&cavity(true)).unwrap();
-    for _ in 0..60 {
-        liquid.step(&ctx, FRAME).unwrap();
-    }
+    liquid.frames(&ctx, FRAME, 60);
     liquid.set_rate(0, 0.0).unwrap();
     liquid.update_terrain(&cavity(false)).unwrap();
     let before = liquid.moved(0);
-    for _ in 0..6 {
-        liquid.step(&ctx, FRAME).unwrap();
-    }
+    liquid.frames(&ctx, FRAME, 6);
     assert!(liquid.moved(0) - before < 1e-13, "{}", liquid.moved(0) - before);
 }

@@ -7,9 +7,9 @@ use frazil::shallow::params::TimeStepping;
 use frazil::shallow::terrain::shapes::Shape;
 use frazil::shallow::{Load, Params, Shallow};
 
+use crate::common::flowing::{FRAME, Frames};
 use crate::common::shallow::{context, covered, ground};
 
-const FRAME: f64 = 1.0 / 60.0;
 const CELL: f64 = 0.002;
 const DENSITY: f64 = 1060.0;
 const G: f64 = 9.81;
@@ -56,9 +56,7 @@ fn what_is_under_the_surface_has_the_weight_of_what_it_displaces() {
         ];
         for body in bodies {
             liquid.set_bodies(&[body]).unwrap();
-            for _ in 0..600 {
-                liquid.step(&ctx, FRAME).unwrap();
-            }
+            liquid.frames(&ctx, FRAME, 600);
             let level = liquid.view().at([0.03, 0.03, 0.03]).unwrap().height;
             let displaced = volume(&liquid, &body, level);
             let own = load(&liquid, [0.0; 3]);
@@ -84,9 +82,7 @@ fn a_dam_holds_back_the_deeper_side() {
     let axes = [DVec3::x(), DVec3::y(), DVec3::z()];
     let dam = Shape::Cuboid { centre: DVec3::new(0.0, 0.0, 0.0), axes, half: [0.005, 0.05, 0.1] };
     liquid.set_bodies(&[dam]).unwrap();
-    for _ in 0..600 {
-        liquid.step(&ctx, FRAME).unwrap();
-    }
+    liquid.frames(&ctx, FRAME, 600);
     let [left, right] = [-0.02, 0.02].map(|x| liquid.view().at([x, 0.0, 0.0]).unwrap().depth);
     let own = load(&liquid, [0.0; 3]);
     let wanted = 0.5 * DENSITY * G * (left * left - right * right) * 0.08;
@@ -105,9 +101,7 @@ fn a_body_that_moves_is_held_back_by_jet_and_shear() {
     let axes = [DVec3::x(), DVec3::y(), DVec3::z()];
     let plate = Shape::Cuboid { centre: DVec3::new(0.0, 0.02, 0.0), axes, half: [0.0015, 0.04, 0.0101] };
     liquid.set_bodies(&[plate]).unwrap();
-    for _ in 0..600 {
-        liquid.step(&ctx, FRAME).unwrap();
-    }
+    liquid.frames(&ctx, FRAME, 600);
     let at_rest = load(&liquid, [0.0; 3]);
     let [still, moving] = [[0.0; 3], [0.3, 0.0, 0.0]].map(|velocity| load(&liquid, velocity));
     assert_eq!(still, at_rest);

@@ -4,14 +4,15 @@ use frazil::geometry::DVec3;
 use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights, TOP};
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::TimeStepping;
-use frazil::shallow::sources::{FlowPoint, Kind};
+use frazil::shallow::sources::Kind;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::terrain::shapes::Shape;
 use frazil::shallow::terrain::solids::Solid;
 use frazil::shallow::{Moved, Params, Shallow, Snapshot};
-use frazil::{Context, Pool};
 
 use crate::common::bodies::Dice;
+use crate::common::flowing::{Frames, from_corner, point};
+use crate::common::shallow::context;
 
 /// Heights from -1 m to 1 m.
 fn heights() -> Heights {
@@ -22,12 +23,8 @@ fn units(metres: f64) -> i32 {
     heights().round(metres)
 }
 
-fn context() -> Context {
-    Context::new(Pool::new(0).unwrap())
-}
-
 fn grid(nx: usize, nz: usize) -> Grid {
-    Grid { cell: 0.01, origin: [0.0; 2], size: [nx, nz] }
+    from_corner(0.01, [nx, nz])
 }
 
 fn solids(grid: Grid, cell: impl FnMut(usize) -> Vec<Solid>) -> Solids {
@@ -205,9 +202,7 @@ fn a_capsule_in_a_pool_lifts_it_and_lets_it_sink_back() {
     shallow.set_bodies(&[]).unwrap();
     let ground = floor(grid, -0.1);
     assert!(*shallow.columns() == *Shallow::new(&ctx, &ground, params()).unwrap().columns());
-    for _ in 0..60 {
-        shallow.step(&ctx, 0.5).unwrap();
-    }
+    shallow.frames(&ctx, 0.5, 60);
     let off = shallow.depths().iter().zip(&still).map(|(a, b)| (a - b).abs()).max().unwrap();
     assert!(heights().length(f64::from(off)) < 1e-4, "it is still by {off} units");
     assert_eq!(shallow.balance().inside, pool);
@@ -438,9 +433,9 @@ fn sources_stay_in_their_positions_when_layers_appear() {
     let ctx = context();
     let grid = grid(20, 20);
     let mut shallow = Shallow::new(&ctx, &floor(grid, 0.0), params()).unwrap();
-    let source = FlowPoint { kind: Kind::Source, at: [0.1, 0.3, 0.1], radius: 0.0, rate: 1e-5, pulse: None };
-    let drain = FlowPoint { kind: Kind::Drain, at: [0.1, 0.0, 0.1], rate: 1e-6, ..source.clone() };
-    shallow.set_flows(&[FlowPoint { at: [0.1, 0.01, 0.1], ..source }, drain], |_| String::new()).unwrap();
+    let source = point(Kind::Source, [0.1, 0.01, 0.1], 0.0, 1e-5);
+    let drain = point(Kind::Drain, [0.1, 0.0, 0.1], 0.0, 1e-6);
+    shallow.set_flows(&[source, drain], |_| String::new()).unwrap();
     let cellar = |_: usize| vec![[BOTTOMLESS, units(-0.3)], [units(-0.1), units(0.0)]];
     let mut shown = 0.0;
     for frame in 0..20 {

@@ -4,19 +4,16 @@ use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::TimeStepping;
 use frazil::shallow::pipes::Border;
-use frazil::shallow::sources::{FlowPoint, Kind};
+use frazil::shallow::sources::Kind;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Reading, Shallow, Snapshot};
-use frazil::{Context, Error, Pool};
+use frazil::{Context, Error};
 
 use crate::common::bodies::Dice;
+use crate::common::flowing::{DOWN, FRAME, Frames, from_corner, point, pour_each, stacked};
+use crate::common::shallow::context;
 
 const CELL: f64 = 0.002;
-const FRAME: f64 = 1.0 / 60.0;
-
-fn context() -> Context {
-    Context::new(Pool::new(0).unwrap())
-}
 
 /// How a scene is turned: cells of the turned one by those of the first, which has `size` cells, and vectors.
 #[derive(Debug, Clone, Copy)]
@@ -82,9 +79,7 @@ fn scene(ctx: &Context, turn: Turn) -> Shallow {
 
 fn run(ctx: &Context, turn: Turn, frames: usize) -> Shallow {
     let mut shallow = scene(ctx, turn);
-    for _ in 0..frames {
-        shallow.step(ctx, FRAME).unwrap();
-    }
+    shallow.frames(ctx, FRAME, frames);
     shallow
 }
 
@@ -325,17 +320,13 @@ fn points_are_read_of_a_snapshot_as_of_the_liquid() {
 fn the_surface_of_a_film_is_half_as_fast_again() {
     let ctx = context();
     let (slope, depth, viscosity) = (0.1, 1e-3, 1e-4);
-    let grid = Grid { cell: 0.0005, origin: [0.0; 2], size: [400, 3] };
-    let heights = Heights::between(-0.01, 0.1).unwrap();
-    let ground = |cell: usize| heights.round(slope * 0.0005 * (400 - cell % 400) as f64);
-    let solids = Solids::new(grid, heights, (0..grid.cells()).map(|cell| vec![[BOTTOMLESS, ground(cell)]]));
+    let solids = stacked(from_corner(0.0005, [400, 3]), [-0.01, 0.1], |[x, _]| {
+        vec![[DOWN, slope * 0.0005 * (400 - x) as f64]]
+    });
     let params =
         Params { liquid: Liquid::new(viscosity), kept: 1.0, pace: TimeStepping::Exact, ..Params::default() };
     let mut shallow = Shallow::new(&ctx, &solids, params).unwrap();
-    let columns: Vec<usize> = shallow.columns().indices().collect();
-    for column in columns {
-        shallow.pour(column, depth);
-    }
+    pour_each(&mut shallow, |_| depth);
     shallow.step(&ctx, 0.1).unwrap();
     let reading = shallow.view().at([0.1, 0.0, 0.00075]).unwrap();
     let mean =
@@ -348,20 +339,12 @@ fn the_surface_of_a_film_is_half_as_fast_again() {
 #[test]
 fn an_absorber_that_is_full_is_read_as_such_behind_a_restore() {
     let ctx = context();
-    let gauze = FlowPoint {
-        kind: Kind::Absorber(1e-8),
-        at: [0.026, 0.0, 0.013],
-        radius: 0.005,
-        rate: 1e-5,
-        pulse: None,
-    };
+    let gauze = point(Kind::Absorber(1e-8), [0.026, 0.0, 0.013], 0.005, 1e-5);
     let set =
         |shallow: &mut Shallow| shallow.set_flows(std::slice::from_ref(&gauze), |_| "gauze".into()).unwrap();
     let mut shallow = scene(&ctx, Turn::None);
     set(&mut shallow);
-    for _ in 0..20 {
-        shallow.step(&ctx, FRAME).unwrap();
-    }
+    shallow.frames(&ctx, FRAME, 20);
     let taken = shallow.balance().absorbed;
     assert!((taken / 1e-8 - 1.0).abs() < 1e-3, "{taken} m3");
     let saved = shallow.save();

@@ -1,19 +1,18 @@
 //! What the liquid carries: amounts add up to the last one, and concentrations stay between those that came in.
 
 use frazil::geometry::DVec3;
-use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
+use frazil::shallow::columns::grid::Grid;
 use frazil::shallow::params::TimeStepping;
 use frazil::shallow::pipes::Border;
-use frazil::shallow::sources::{FlowPoint, Kind};
-use frazil::shallow::terrain::Solids;
+use frazil::shallow::sources::Kind;
 use frazil::shallow::terrain::shapes::Shape;
 use frazil::shallow::{Law, Params, Scalar, Shallow, Snapshot};
 use frazil::{Context, Pool};
 
 use crate::common::bodies::Dice;
+use crate::common::flowing::{DOWN, FRAME, Frames, from_corner, point, pour_each, stacked};
 use crate::common::shallow::{Plan, Turn, busy, context, turnable};
 
-const FRAME: f64 = 1.0 / 60.0;
 /// Levels in a range.
 const LEVELS: f64 = (1 << 20) as f64;
 
@@ -142,10 +141,7 @@ fn a_uniform_concentration_stays_uniform_to_the_bit() {
 
 /// Level ground of so many cells of 2 mm, with walls around.
 fn basin(ctx: &Context, size: [usize; 2], scalars: &[Scalar]) -> Shallow {
-    let grid = Grid { cell: 0.002, origin: [0.0; 2], size };
-    let heights = Heights::between(0.0, 0.1).unwrap();
-    let solids =
-        Solids::new(grid, heights, (0..grid.cells()).map(|_| vec![[BOTTOMLESS, heights.round(0.01)]]));
+    let solids = stacked(from_corner(0.002, size), [0.0, 0.1], |_| vec![[DOWN, 0.01]]);
     let params = Params { pace: TimeStepping::Realtime(0.003), ..Params::default() };
     let mut liquid = Shallow::new(ctx, &solids, params).unwrap();
     liquid.set_scalars(scalars).unwrap();
@@ -154,7 +150,7 @@ fn basin(ctx: &Context, size: [usize; 2], scalars: &[Scalar]) -> Shallow {
 
 /// A source and a drain of a rate (m3/s) over a whole basin.
 fn through(liquid: &mut Shallow, rate: f64) {
-    let point = |kind| FlowPoint { kind, at: [0.008, 0.01, 0.008], radius: 0.1, rate, pulse: None };
+    let point = |kind| self::point(kind, [0.008, 0.01, 0.008], 0.1, rate);
     liquid.set_flows(&[point(Kind::Source), point(Kind::Drain)], |at| at.to_string()).unwrap();
 }
 
@@ -202,9 +198,7 @@ fn liquid_ages_by_the_time_and_decays_by_its_half_life() {
     let mut liquid = basin(&ctx, [8, 8], &three()[1..2]);
     liquid.fill(0.012);
     through(&mut liquid, 512e-9 / 0.5);
-    for _ in 0..300 {
-        liquid.step(&ctx, FRAME).unwrap();
-    }
+    liquid.frames(&ctx, FRAME, 300);
     assert!((liquid.concentration(0, 3) - 0.5).abs() < 0.004, "{}", liquid.concentration(0, 3));
 }
 
@@ -231,9 +225,7 @@ fn any_number_of_threads_carries_the_same() {
             let row = 20 * stripe as usize;
             plan.pour(&mut liquid, Turn::NONE, [[0, row], [516, row + 19]], 1e-3);
         }
-        for _ in 0..3 {
-            liquid.step(&ctx, FRAME).unwrap();
-        }
+        liquid.frames(&ctx, FRAME, 3);
         liquid
     };
     let alone = run(0);
@@ -253,7 +245,6 @@ fn any_number_of_threads_carries_the_same() {
 #[test]
 fn turned_and_mirrored_scenes_carry_the_same() {
     let ctx = context();
-    let turns: Vec<Turn> = Turn::TURNS.into_iter().chain(Turn::MIRRORS).collect();
     for seed in 0..20 {
         let plan = turnable(seed);
         let of = |liquid: &Shallow, turn: Turn| {
@@ -266,22 +257,18 @@ fn turned_and_mirrored_scenes_carry_the_same() {
             }
             out
         };
-        let mut first = wide(&ctx, &plan, Turn::NONE);
-        let mut liquids: Vec<(Shallow, Turn)> =
-            turns.iter().map(|&turn| (wide(&ctx, &plan, turn), turn)).collect();
+        let mut liquids = Turn::ALL.map(|turn| (wide(&ctx, &plan, turn), turn));
         for frame in 0..25 {
             let mut dice = Dice(seed << 32 | frame);
             let corners = [(); 2].map(|()| plan.size.map(|count| dice.below(count)));
             let (depth, dye) = ([-1.0, 1e-4, 0.0][dice.below(3)], dice.between(0.0, 1.0));
-            for (liquid, turn) in std::iter::once((&mut first, Turn::NONE))
-                .chain(liquids.iter_mut().map(|(liquid, turn)| (liquid, *turn)))
-            {
+            for (liquid, turn) in &mut liquids {
                 liquid.set_poured(&[dye, 0.0, 1.0]).unwrap();
-                plan.pour(liquid, turn, corners, depth);
+                plan.pour(liquid, *turn, corners, depth);
                 liquid.step(&ctx, FRAME).unwrap();
             }
-            let wanted = of(&first, Turn::NONE);
-            for (liquid, turn) in &liquids {
+            let wanted = of(&liquids[0].0, Turn::NONE);
+            for (liquid, turn) in &liquids[1..] {
                 assert!(of(liquid, *turn) == wanted, "seed {seed}, frame {frame}, {turn:?}");
             }
         }
@@ -379,12 +366,8 @@ fn snapshots_and_boxes_show_concentrations() {
         assert!(snapshot.concentrations(0) == concentrations(&liquid, 0));
     }
     // Where it has run dry since, it is forgotten.
-    for column in liquid.columns().indices().collect::<Vec<_>>() {
-        liquid.pour(column, -1.0);
-    }
-    for _ in 0..2 {
-        liquid.step(&ctx, FRAME).unwrap();
-    }
+    pour_each(&mut liquid, |_| -1.0);
+    liquid.frames(&ctx, FRAME, 2);
     snapshot.take(&liquid);
     assert!(snapshot.concentrations(0).iter().all(|own| *own == 0.0));
     liquid.set_scalars(&[]).unwrap();

@@ -7,9 +7,8 @@ use frazil::shallow::{Params, Shallow};
 use frazil::{Context, Pool};
 
 use crate::common::bodies::Dice;
+use crate::common::flowing::{FRAME, Frames};
 use crate::common::shallow::{Plan, Turn, context, covered, ground, random_params, source, waves};
-
-const FRAME: f64 = 1.0 / 60.0;
 
 /// Blood of 2 mm on ground that rolls, after so many frames.
 fn pool(ctx: &Context, frames: usize) -> Shallow {
@@ -18,9 +17,7 @@ fn pool(ctx: &Context, frames: usize) -> Shallow {
     let mut pool = covered(ctx, &solids, Params { rest: 1e-6, ..Params::default() }, |[x, z], _| {
         2e-3 + 4e-4 * waves([2.0 * z, 2.0 * x], cell)
     });
-    for _ in 0..frames {
-        pool.step(ctx, FRAME).unwrap();
-    }
+    pool.frames(ctx, FRAME, frames);
     pool
 }
 
@@ -55,9 +52,7 @@ fn liquid_that_never_rests_stays_awake() {
     let ctx = context();
     let mut pool = pool(&ctx, 0);
     pool.set_params(Params { rest: 0.0, ..Params::default() }).unwrap();
-    for _ in 0..400 {
-        pool.step(&ctx, FRAME).unwrap();
-    }
+    pool.frames(&ctx, FRAME, 400);
     assert!(flowing(&pool) > 0);
     for rest in [-1e-9, 0.02, f64::NAN] {
         let error = pool.set_params(Params { rest, ..Params::default() }).unwrap_err().to_string();
@@ -96,9 +91,7 @@ fn whatever_happens_to_it_wakes_a_pool() {
         other.set_sleepless(true);
         for pool in [&mut pool, &mut other] {
             pool.restore(&saved).unwrap();
-            for _ in 0..3 {
-                pool.step(&ctx, FRAME).unwrap();
-            }
+            pool.frames(&ctx, FRAME, 3);
             wake(pool);
         }
         let mut most = 0;

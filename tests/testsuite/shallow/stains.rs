@@ -9,9 +9,9 @@ use frazil::shallow::terrain::triangles;
 use frazil::shallow::{Params, Scalar, Shallow, Staining, Stains};
 
 use crate::common::bodies::Dice;
+use crate::common::flowing::{FRAME, Frames, pour_each};
 use crate::common::shallow::{context, source};
 
-const FRAME: f64 = 1.0 / 60.0;
 const CELL: f64 = 0.002;
 
 /// A trough along x with walls at its ends, its vertices half a cell apart and not on the cells, moved by some cells along x.
@@ -85,9 +85,7 @@ fn a_stain_comes_while_it_is_wet_and_halves_when_it_is_dry() {
     let mut washed = (stains.clone(), Shallow::new(&ctx, &solids(&mesh), liquid.params().clone()).unwrap());
     washed.1.set_scalars(&[Scalar::dye("water")]).unwrap();
     washed.1.fill(0.02);
-    for _ in 0..60 {
-        washed.1.step(&ctx, FRAME).unwrap();
-    }
+    washed.1.frames(&ctx, FRAME, 60);
     for _ in 0..30 {
         washed.1.step(&ctx, FRAME).unwrap();
         washed.0.update(&mut washed.1, &mesh.positions).unwrap();
@@ -97,9 +95,7 @@ fn a_stain_comes_while_it_is_wet_and_halves_when_it_is_dry() {
         assert!((f64::from(after) - wanted).abs() < 1e-4, "{after} of {before}");
     }
     // Without liquid it fades, seen every frame or not.
-    for column in liquid.columns().indices().collect::<Vec<_>>() {
-        liquid.pour(column, -1.0);
-    }
+    pour_each(&mut liquid, |_| -1.0);
     let mut unseen = stains.clone();
     for _ in 0..240 {
         liquid.step(&ctx, FRAME).unwrap();
@@ -125,9 +121,7 @@ fn stains_move_with_the_mesh() {
         stains.update(&mut liquid, &mesh.positions).unwrap();
     }
     liquid.set_flows(&[], |_| String::new()).unwrap();
-    for column in liquid.columns().indices().collect::<Vec<_>>() {
-        liquid.pour(column, -1.0);
-    }
+    pour_each(&mut liquid, |_| -1.0);
     let before = stains_of(&stains);
     assert!(before.iter().filter(|stain| **stain > 0.9).count() > 50);
     for frame in 1..=40 {
@@ -175,9 +169,7 @@ fn ground_absorbs_what_it_holds_and_the_balance_says_so() {
     let mut puddle = Shallow::new(&ctx, &solids(&mesh), liquid.params().clone()).unwrap();
     let mut dry = Stains::new(&puddle, &mesh.positions, &mesh.triangles, staining).unwrap();
     puddle.set_flows(&[source([0.03, 0.012, 0.021], 0.006, 1e-7)], |_| "the source".into()).unwrap();
-    for _ in 0..6 {
-        puddle.step(&ctx, FRAME).unwrap();
-    }
+    puddle.frames(&ctx, FRAME, 6);
     puddle.set_flows(&[], |_| String::new()).unwrap();
     for _ in 0..600 {
         puddle.step(&ctx, FRAME).unwrap();

@@ -1,46 +1,42 @@
 //! Saved states: what is restored flows on to the same bytes, and what is damaged changes nothing.
 
-use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
+use frazil::shallow::columns::grid::Grid;
 use frazil::shallow::params::TimeStepping;
 use frazil::shallow::pipes::Border;
 use frazil::shallow::sources::{FlowPoint, Kind, Pulse};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
-use frazil::{Context, Error, Pool};
-use xxhash_rust::xxh3::xxh3_128;
+use frazil::{Context, Error};
+
+use crate::common::flowing::{DOWN, FRAME, Frames, damaged, from_corner, point, seal, stacked};
 
 use crate::common::bodies::Dice;
+use crate::common::liquids::context;
 
 const SIZE: [usize; 2] = [45, 30];
 const CELL: f64 = 0.002;
-const FRAME: f64 = 1.0 / 60.0;
 
 /// Rough ground with a hole and a trough, which a slab covers up to its brim, and a bridge above all.
 fn terrain(seed: u64) -> Solids {
     let mut dice = Dice(seed);
     let grid = Grid { cell: CELL, origin: [0.01, -0.02], size: SIZE };
-    let heights = Heights::between(-0.02, 0.08).unwrap();
-    let cell = |index: usize| {
-        let [x, z] = [index % SIZE[0], index / SIZE[0]];
+    stacked(grid, [-0.02, 0.08], |[x, z]| {
         let rough = dice.between(0.0, 0.0004);
-        let unit = |height: f64| heights.round(height);
         let trough = (8..14).contains(&z) && (4..30).contains(&x);
         let ground = if trough { -0.008 } else { 0.0003 * x as f64 + rough };
-        let mut solids = vec![[BOTTOMLESS, unit(ground)]];
+        let mut solids = vec![[DOWN, ground]];
         if (8..14).contains(&z) && (10..24).contains(&x) {
-            solids.push([unit(-0.004), unit(0.009 + rough)]);
+            solids.push([-0.004, 0.009 + rough]);
         }
         if (20..24).contains(&x) {
-            solids.push([unit(0.015), unit(0.02 - 0.0004 * z as f64)]);
+            solids.push([0.015, 0.02 - 0.0004 * z as f64]);
         }
         if (16..18).contains(&x) && (3..5).contains(&z) { Vec::new() } else { solids }
-    };
-    Solids::new(grid, heights, (0..grid.cells()).map(cell).collect::<Vec<_>>())
+    })
 }
 
 fn points() -> Vec<FlowPoint> {
-    let point =
-        |kind: Kind, at: [f64; 3], rate: f64| FlowPoint { kind, at, radius: 0.004, rate, pulse: None };
+    let point = |kind: Kind, at: [f64; 3], rate: f64| self::point(kind, at, 0.004, rate);
     let pulse = Some(Pulse { frequency: 1.3, share: 0.8 });
     vec![
         FlowPoint { pulse, ..point(Kind::Source, [0.053, 0.02, -0.01], 3e-6) },
@@ -52,10 +48,6 @@ fn points() -> Vec<FlowPoint> {
 
 fn params(border: Border, pace: TimeStepping) -> Params {
     Params { border, pace, ..Params::default() }
-}
-
-fn context(threads: usize) -> Context {
-    Context::new(Pool::new(threads).unwrap())
 }
 
 /// Liquid in the trough and on the bridge, and what the points bring.
@@ -83,12 +75,6 @@ fn other(ctx: &Context, seed: u64, params: Params) -> Shallow {
     shallow.pour(corner, 0.02);
     shallow.step(ctx, 3.0 * FRAME).unwrap();
     shallow
-}
-
-fn run(shallow: &mut Shallow, ctx: &Context, frames: usize) {
-    for _ in 0..frames {
-        shallow.step(ctx, FRAME).unwrap();
-    }
 }
 
 /// The first position where bytes differ.
@@ -161,10 +147,8 @@ fn pouring_between_frames_is_part_of_the_state() {
 #[test]
 fn any_number_of_threads_saves_the_same_bytes_and_goes_on_from_them() {
     // Enough columns for a step to be divided among threads.
-    let grid = Grid { cell: CELL, origin: [0.0; 2], size: [340, 320] };
-    let heights = Heights::between(-0.02, 0.08).unwrap();
-    let ground = |cell: usize| heights.round(1e-5 * (cell % 340) as f64 + 2e-5 * (cell / 340) as f64);
-    let solids = Solids::new(grid, heights, (0..grid.cells()).map(|cell| vec![[BOTTOMLESS, ground(cell)]]));
+    let ground = |[x, z]: [usize; 2]| vec![[DOWN, 1e-5 * x as f64 + 2e-5 * z as f64]];
+    let solids = stacked(from_corner(CELL, [340, 320]), [-0.02, 0.08], ground);
     let params = params(Border::Open, TimeStepping::Realtime(0.003));
     let contexts = [context(0), context(2)];
     let mut liquids = [0, 1].map(|which| Shallow::new(&contexts[which], &solids, params.clone()).unwrap());
@@ -174,16 +158,16 @@ fn any_number_of_threads_saves_the_same_bytes_and_goes_on_from_them() {
         }
     }
     for (liquid, ctx) in liquids.iter_mut().zip(&contexts) {
-        run(liquid, ctx, 4);
+        liquid.frames(ctx, FRAME, 4);
     }
     let saved = liquids.each_ref().map(Shallow::save);
     assert_eq!(difference(&saved[0], &saved[1]), None);
     let [alone, several] = &mut liquids;
-    run(alone, &contexts[0], 4);
+    alone.frames(&contexts[0], FRAME, 4);
     several.fill(0.001);
-    run(several, &contexts[1], 1);
+    several.frames(&contexts[1], FRAME, 1);
     several.restore(&saved[0]).unwrap();
-    run(several, &contexts[1], 4);
+    several.frames(&contexts[1], FRAME, 4);
     assert_eq!(difference(&alone.save(), &several.save()), None);
 }
 
@@ -211,10 +195,7 @@ fn a_state_goes_into_a_vector_or_a_slice_that_is_there() {
 #[test]
 fn a_puddle_in_a_large_domain_is_a_small_state() {
     let ctx = context(0);
-    let grid = Grid { cell: CELL, origin: [0.0; 2], size: [800, 800] };
-    let heights = Heights::between(-0.02, 0.08).unwrap();
-    let solids =
-        Solids::new(grid, heights, (0..grid.cells()).map(|_| vec![[BOTTOMLESS, heights.round(0.0)]]));
+    let solids = stacked(from_corner(CELL, [800, 800]), [-0.02, 0.08], |_| vec![[DOWN, 0.0]]);
     let mut shallow = Shallow::new(&ctx, &solids, Params::default()).unwrap();
     shallow.pour(shallow.columns().column([399, 400], 0).unwrap(), 0.004);
     shallow.step(&ctx, FRAME).unwrap();
@@ -236,12 +217,6 @@ fn refusal(shallow: &mut Shallow, bytes: &[u8]) -> String {
     assert_eq!(difference(&shallow.save(), &before), None, "{what}");
     assert!(shallow.last_steps() == steps && shallow.time() == time, "{what}");
     what
-}
-
-/// The hash at the end put right.
-fn seal(bytes: &mut [u8]) {
-    let (body, seal) = bytes.split_at_mut(bytes.len() - 16);
-    seal.copy_from_slice(&xxh3_128(body).to_le_bytes());
 }
 
 #[test]
@@ -284,38 +259,17 @@ fn a_state_of_something_else_is_refused_with_a_sentence() {
     shallow.restore(&saved).unwrap();
 }
 
-/// A state with some of its bytes changed, or cut.
-fn damaged(saved: &[u8], dice: &mut Dice) -> Vec<u8> {
-    let mut bytes = saved.to_vec();
-    if dice.one_in(4) {
-        bytes.truncate(dice.below(saved.len()));
-        return bytes;
-    }
-    for _ in 0..=dice.below(3) {
-        // Often in what comes before the arrays.
-        let end = if dice.one_in(2) { 600 } else { saved.len() };
-        let at = dice.below(end.min(saved.len()));
-        bytes[at] = match dice.below(4) {
-            0 => 0,
-            1 => 255,
-            2 => bytes[at] ^ 1 << dice.below(8),
-            _ => dice.below(256) as u8,
-        };
-    }
-    bytes
-}
-
 #[test]
 fn damaged_states_are_refused_and_change_nothing() {
     let ctx = context(0);
     let mut shallow = scene(&ctx, 1, params(Border::Open, TimeStepping::Exact));
-    run(&mut shallow, &ctx, 10);
+    shallow.frames(&ctx, FRAME, 10);
     let saved = shallow.save();
-    run(&mut shallow, &ctx, 3);
+    shallow.frames(&ctx, FRAME, 3);
     let before = shallow.save();
     let mut dice = Dice(17);
     for turn in 0..10_000 {
-        let bytes = damaged(&saved, &mut dice);
+        let bytes = damaged(&saved, 600, &mut dice);
         match shallow.restore(&bytes) {
             Ok(()) => {
                 assert_eq!(difference(&bytes, &saved), None, "turn {turn}");
@@ -331,13 +285,13 @@ fn damaged_states_are_refused_and_change_nothing() {
 fn states_with_wrong_numbers_and_the_right_hash_are_refused_or_flow() {
     let ctx = context(0);
     let mut shallow = scene(&ctx, 1, params(Border::Open, TimeStepping::Realtime(0.003)));
-    run(&mut shallow, &ctx, 10);
+    shallow.frames(&ctx, FRAME, 10);
     let saved = shallow.save();
     let before = shallow.save();
     let mut dice = Dice(23);
     let mut flowed = 0;
     for turn in 0..10_000 {
-        let mut bytes = damaged(&saved, &mut dice);
+        let mut bytes = damaged(&saved, 600, &mut dice);
         if bytes.len() < 16 {
             continue;
         }

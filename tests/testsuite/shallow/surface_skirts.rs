@@ -217,21 +217,11 @@ fn skirts_end_at_the_silhouette_of_the_ground() {
         assert!(skirted(&columns, &depth, ledges).positions == mesh.positions);
     }
     // Bad meshes.
-    assert!(
-        silhouette
-            .fit(&mut ledges, &columns, &positions, &[[0, 1, 99]])
-            .unwrap_err()
-            .to_string()
-            .contains("not there")
-    );
+    let error = silhouette.fit(&mut ledges, &columns, &positions, &[[0, 1, 99]]).unwrap_err().to_string();
+    assert!(error.contains("not there"), "{error}");
     positions[3].y = f32::NAN;
-    assert!(
-        silhouette
-            .fit(&mut ledges, &columns, &positions, &faces)
-            .unwrap_err()
-            .to_string()
-            .contains("not finite")
-    );
+    let error = silhouette.fit(&mut ledges, &columns, &positions, &faces).unwrap_err().to_string();
+    assert!(error.contains("not finite"), "{error}");
 }
 
 #[test]

@@ -7,9 +7,9 @@ use frazil::shallow::params::TimeStepping;
 use frazil::shallow::{Law, Params, Scalar, Shallow, Thickening};
 
 use crate::common::bodies::Dice;
+use crate::common::flowing::{FRAME, Frames, pour_each};
 use crate::common::shallow::{Turn, context, covered, ground, turnable};
 
-const FRAME: f64 = 1.0 / 60.0;
 const SLOPE: f64 = 0.1;
 const NU: f64 = 4e-6;
 
@@ -26,17 +26,13 @@ fn film(ctx: &Context, thickening: Option<Thickening>, dye: f64) -> Shallow {
     let mut liquid = covered(ctx, &solids, params, |_, _| 0.0);
     liquid.set_scalars(&[Scalar::dye("dye")]).unwrap();
     liquid.set_poured(&[dye]).unwrap();
-    for column in liquid.columns().indices().collect::<Vec<_>>() {
-        liquid.pour(column, 3e-4);
-    }
+    pour_each(&mut liquid, |_| 3e-4);
     liquid
 }
 
 /// Mean velocity in the middle, before anything comes from the ends.
 fn speed(ctx: &Context, liquid: &mut Shallow) -> f64 {
-    for _ in 0..8 {
-        liquid.step(ctx, FRAME).unwrap();
-    }
+    liquid.frames(ctx, FRAME, 8);
     let middle = liquid.columns().column([24, 3], 0).unwrap();
     f64::from(liquid.velocity(middle)[0])
 }
@@ -89,9 +85,7 @@ fn blood_that_ages_comes_to_rest_on_a_slope() {
     let law = Thickening { scalar: 0, from: 0.2, to: 0.6, times: 1e5 };
     let mut liquid = film(&ctx, Some(law), 0.0);
     liquid.set_scalars(&[Scalar { name: "age".into(), law: Law::Ages, range: 60.0 }]).unwrap();
-    for _ in 0..60 {
-        liquid.step(&ctx, FRAME).unwrap();
-    }
+    liquid.frames(&ctx, FRAME, 60);
     let middle = liquid.columns().column([10, 3], 0).unwrap();
     assert!(liquid.depths()[middle] > 0 && liquid.velocity(middle)[0].abs() < 1e-5);
     assert!(liquid.concentration(0, middle) > 0.9);
@@ -101,21 +95,20 @@ fn blood_that_ages_comes_to_rest_on_a_slope() {
 fn a_turned_scene_any_number_of_threads_and_a_restored_liquid_thicken_the_same() {
     let law = Some(Thickening { scalar: 0, from: 0.0, to: 1.0, times: 50.0 });
     let ctx = context();
-    let turns: Vec<Turn> = [Turn::NONE].iter().chain(&Turn::TURNS).chain(&Turn::MIRRORS).copied().collect();
     for seed in 0..20 {
         let mut plan = turnable(seed);
         plan.params.liquid = Liquid::new(1e-5);
         plan.params.thickening = law;
-        let mut liquids: Vec<Shallow> = turns.iter().map(|turn| plan.make(&ctx, *turn)).collect();
+        let mut liquids = Turn::ALL.map(|turn| plan.make(&ctx, turn));
         liquids.iter_mut().for_each(|liquid| liquid.set_scalars(&[Scalar::dye("dye")]).unwrap());
         for frame in 0..10 {
-            let all = liquids.iter_mut().zip(&turns).map(|(liquid, turn)| {
+            let all = liquids.iter_mut().zip(Turn::ALL).map(|(liquid, turn)| {
                 let mut dice = Dice(seed << 32 | frame);
                 liquid.set_poured(&[dice.between(0.0, 1.0)]).unwrap();
                 let corners = [(); 2].map(|()| plan.size.map(|count| dice.below(count)));
-                plan.pour(liquid, *turn, corners, [-1.0, 1e-4, 1e-3][dice.below(3)]);
+                plan.pour(liquid, turn, corners, [-1.0, 1e-4, 1e-3][dice.below(3)]);
                 liquid.step(&ctx, FRAME).unwrap();
-                plan.depths_of(liquid, *turn)
+                plan.depths_of(liquid, turn)
             });
             let all: Vec<_> = all.collect();
             assert!(all.iter().all(|other| *other == all[0]), "seed {seed}, frame {frame}");
@@ -132,9 +125,7 @@ fn a_turned_scene_any_number_of_threads_and_a_restored_liquid_thicken_the_same()
             liquid.set_poured(&[((x / 30 + z / 20) % 5) as f64 / 4.0]).unwrap();
             liquid.pour(column, 1e-3);
         }
-        for _ in 0..4 {
-            liquid.step(&ctx, FRAME).unwrap();
-        }
+        liquid.frames(&ctx, FRAME, 4);
         (liquid, ctx)
     };
     let (mut alone, ctx) = run(0);

@@ -1,36 +1,32 @@
 //! The same bytes from any number of threads.
 
-use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
+use frazil::shallow::columns::grid::{BOTTOMLESS, Heights};
 use frazil::shallow::pipes::Border;
-use frazil::shallow::sources::{FlowPoint, Kind};
+use frazil::shallow::sources::Kind;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
 use frazil::{Context, Pool};
 
+use crate::common::flowing::{from_corner, point, pour_each};
+
 /// Waves on uneven ground with shelves above it, too low for some of the liquid, in over 100,000 columns.
 fn shelves(ctx: &Context) -> Shallow {
     let size = 300;
-    let grid = Grid { cell: 0.0005, origin: [0.0; 2], size: [size, size] };
     let heights = Heights::between(0.0, 0.1).unwrap();
-    let cell = |index: usize| {
-        let (x, z) = (index % size, index / size);
-        let rise = heights.round(0.0005 + 0.0001 * ((x * 7 + z * 3) % 11) as f64 + 0.00002 * x as f64);
-        let shelf = [rise + heights.round(0.002), rise + heights.round(0.003)];
-        let mut solids = vec![[BOTTOMLESS, rise]];
-        if (x / 20 + z / 30) % 3 > 0 {
-            solids.push(shelf);
-        }
-        solids
-    };
+    let solids = Solids::new(
+        from_corner(0.0005, [size, size]),
+        heights,
+        (0..size * size).map(|index| {
+            let (x, z) = (index % size, index / size);
+            let rise = heights.round(0.0005 + 0.0001 * ((x * 7 + z * 3) % 11) as f64 + 0.00002 * x as f64);
+            let shelf = [rise + heights.round(0.002), rise + heights.round(0.003)];
+            if (x / 20 + z / 30) % 3 > 0 { vec![[BOTTOMLESS, rise], shelf] } else { vec![[BOTTOMLESS, rise]] }
+        }),
+    );
     let params = Params { border: Border::Open, ..Params::default() };
-    let solids = Solids::new(grid, heights, (0..size * size).map(cell));
     let mut liquid = Shallow::new(ctx, &solids, params).unwrap();
-    for column in liquid.columns().indices().collect::<Vec<_>>() {
-        let [x, z] = liquid.columns().cell(column);
-        liquid.pour(column, 0.0001 * ((x * x + 5 * z) % 23) as f64);
-    }
-    let source =
-        FlowPoint { kind: Kind::Source, at: [0.07, 0.0, 0.0745], radius: 0.004, rate: 4e-6, pulse: None };
+    pour_each(&mut liquid, |[x, z]| 0.0001 * ((x * x + 5 * z) % 23) as f64);
+    let source = point(Kind::Source, [0.07, 0.0, 0.0745], 0.004, 4e-6);
     liquid.set_flows(&[source], |_| "the source".into()).unwrap();
     liquid
 }

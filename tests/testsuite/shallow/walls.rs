@@ -1,22 +1,18 @@
 //! Friction at walls and ceilings, and between liquids that flow side by side.
 
-use std::process::Command;
-
-use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::{Friction, Section, TimeStepping};
-use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
 use frazil::{Context, Pool};
 
 use crate::common::bodies::Dice;
+use crate::common::flowing::{DOWN, FRAME, Frames, assert_same_depths, at_all_levels, from_corner, stacked};
 use crate::common::shallow::{
     Plan, Turn, context, covered, extreme, extreme_frame, ground, hash, turnable, violations,
 };
 
 const G: f64 = 9.81;
 const CELL: f64 = 0.0005;
-const FRAME: f64 = 1.0 / 60.0;
 
 /// A liquid with friction at walls that loses nothing else.
 fn walled(viscosity: f64) -> Params {
@@ -43,15 +39,12 @@ fn duct(width: f64, height: f64) -> f64 {
 /// gravity that leans by 0.02, after a time (s).
 fn channel(across: usize, depth: f64, axis: usize, friction: Friction, time: f64) -> Vec<f64> {
     let ctx = context();
-    let heights = Heights::between(-0.02, 0.1).unwrap();
     let size = if axis == 0 { [9, across + 2] } else { [across + 2, 9] };
-    let grid = Grid { cell: CELL, origin: [0.0; 2], size };
     let is_bank = |at: usize| at == 0 || at == across + 1;
-    let solids = |index: usize| {
-        let at = [index % size[0], index / size[0]][1 - axis];
-        vec![[BOTTOMLESS, heights.round(if is_bank(at) { 0.05 } else { 0.0 })]]
-    };
-    let solids = Solids::new(grid, heights, (0..grid.cells()).map(solids));
+    let solids = stacked(from_corner(CELL, size), [-0.02, 0.1], |cell| {
+        vec![[DOWN, if is_bank(cell[1 - axis]) { 0.05 } else { 0.0 }]]
+    });
+    let heights = solids.heights;
     let mut gravity = [0.0, -G, 0.0];
     gravity[2 * axis] = 0.02 * G;
     let mut liquid = Shallow::new(&ctx, &solids, Params { gravity, friction, ..walled(1e-4) }).unwrap();
@@ -103,9 +96,7 @@ fn films_far_thinner_than_a_cell_are_the_same_to_the_bit() {
         let solids = ground([40, 24], CELL, [-0.01, 0.1], |[x, z]| 0.02 - 0.3 * x + 0.2 * z);
         let params = Params { friction, ..Params::default() };
         let mut film = covered(&ctx, &solids, params, |[x, _], _| if x < 0.0 { CELL / 40.0 } else { 0.0 });
-        (0..30).for_each(|_| {
-            film.step(&ctx, FRAME).unwrap();
-        });
+        film.frames(&ctx, FRAME, 30);
         film
     };
     let (walls, ground) = (run(Friction::Walls), run(Friction::Ground));
@@ -116,11 +107,10 @@ fn films_far_thinner_than_a_cell_are_the_same_to_the_bit() {
 #[test]
 fn a_scene_that_is_turned_or_mirrored_flows_the_same() {
     let ctx = context();
-    let turns: Vec<Turn> = [Turn::NONE].into_iter().chain(Turn::TURNS).chain(Turn::MIRRORS).collect();
     let mut acted = 0;
     for seed in 0..12 {
         let plan = scene(seed);
-        let mut liquids: Vec<Shallow> = turns.iter().map(|turn| plan.make(&ctx, *turn)).collect();
+        let mut liquids = Turn::ALL.map(|turn| plan.make(&ctx, turn));
         let mut other =
             Plan { params: Params { friction: Friction::Ground, ..plan.params.clone() }, ..plan.clone() }
                 .make(&ctx, Turn::NONE);
@@ -129,18 +119,15 @@ fn a_scene_that_is_turned_or_mirrored_flows_the_same() {
             let corners = [(); 2].map(|()| plan.size.map(|count| dice.below(count)));
             let depth = [-1.0, -1.0, 1e-4, 0.0][dice.below(4)];
             let mut depths = Vec::new();
-            for (liquid, turn) in liquids.iter_mut().zip(&turns) {
-                plan.pour(liquid, *turn, corners, depth);
+            for (liquid, turn) in liquids.iter_mut().zip(Turn::ALL) {
+                plan.pour(liquid, turn, corners, depth);
                 liquid.step(&ctx, FRAME).unwrap();
                 assert_eq!(liquid.balance().error, 0);
-                depths.push(plan.depths_of(liquid, *turn));
+                depths.push(plan.depths_of(liquid, turn));
             }
             plan.pour(&mut other, Turn::NONE, corners, depth);
             other.step(&ctx, FRAME).unwrap();
-            for (turn, turned) in turns.iter().zip(&depths) {
-                let differ = turned.iter().zip(&depths[0]).filter(|(a, b)| a != b).count();
-                assert_eq!(differ, 0, "scene {seed}, frame {frame}, {turn:?}: columns that differ");
-            }
+            assert_same_depths(&depths, &format!("scene {seed}, frame {frame}"));
         }
         acted += u32::from(hash(&other) != hash(&liquids[0]));
     }
@@ -176,9 +163,7 @@ fn more_threads_make_the_same_liquid() {
         let hashes = [0, 2, 3].map(|threads| {
             let ctx = Context::new(Pool::new(threads).unwrap());
             let mut liquid = basins(&ctx, viscosity);
-            (0..3).for_each(|_| {
-                liquid.step(&ctx, FRAME).unwrap();
-            });
+            liquid.frames(&ctx, FRAME, 3);
             hash(&liquid)
         });
         assert_eq!(hashes, [hashes[0]; 3], "{viscosity} m2/s");
@@ -191,9 +176,7 @@ fn a_restored_liquid_flows_on_to_the_same_bits() {
     for seed in 0..6 {
         let plan = scene(seed);
         let (mut liquid, mut other) = (plan.make(&ctx, Turn::NONE), plan.make(&ctx, Turn::NONE));
-        (0..5).for_each(|_| {
-            liquid.step(&ctx, FRAME).unwrap();
-        });
+        liquid.frames(&ctx, FRAME, 5);
         other.restore(&liquid.save()).unwrap();
         for _ in 0..5 {
             liquid.step(&ctx, FRAME).unwrap();
@@ -212,9 +195,7 @@ fn a_lake_of_honey_stays_at_rest_and_a_disturbed_one_only_calms_down() {
     let mut liquid = covered(&ctx, &solids, params, |_, _| 0.0);
     liquid.fill(0.002);
     let before = liquid.depths().to_vec();
-    (0..30).for_each(|_| {
-        liquid.step(&ctx, FRAME).unwrap();
-    });
+    liquid.frames(&ctx, FRAME, 30);
     let differ = liquid.depths().iter().zip(&before).filter(|(a, b)| a != b).count();
     assert_eq!(differ, 0);
     // Energy over that at rest, in units of height.
@@ -254,22 +235,14 @@ fn all_instruction_sets_make_the_same_liquid() {
         for seed in 0..8 {
             let ctx = context();
             let mut liquid = scene(seed).make(&ctx, Turn::NONE);
-            (0..8).for_each(|_| {
-                liquid.step(&ctx, FRAME).unwrap();
-            });
+            liquid.frames(&ctx, FRAME, 8);
             println!("liquid {seed} {:016x}", hash(&liquid));
         }
         return;
     }
-    let liquids = ["baseline", "avx2", "avx512"].map(|level| {
-        let mut run = Command::new(std::env::current_exe().unwrap());
-        run.args(["--exact", "shallow::walls::all_instruction_sets_make_the_same_liquid", "--nocapture"]);
-        let output = run.env("FRAZIL_CPU", level).env(PRINTS, "1").output().unwrap();
-        let text = String::from_utf8(output.stdout).unwrap();
-        text.lines().filter(|line| line.starts_with("liquid ")).map(str::to_string).collect::<Vec<_>>()
-    });
+    let liquids = at_all_levels("shallow::walls::all_instruction_sets_make_the_same_liquid", PRINTS);
     assert_eq!(liquids[0].len(), 8);
-    assert_eq!(liquids, [liquids[0].clone(), liquids[0].clone(), liquids[0].clone()]);
+    assert_eq!([&liquids[1], &liquids[2]], [&liquids[0]; 2]);
 }
 
 #[test]

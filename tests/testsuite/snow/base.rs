@@ -1,6 +1,8 @@
 //! The base layer against analytic volumes and against itself.
 
+use crate::common::liquids::context;
 use crate::common::shapes::{cuboid, sphere};
+use frazil::Context;
 use frazil::geometry::{DVec3, Vec3};
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::NoiseParams;
@@ -9,13 +11,8 @@ use frazil::snow::base_layer::{BaseLayer, Params};
 use frazil::sweep::Body;
 use frazil::vdb::file::{WriteOptions, to_bytes};
 use frazil::vdb::{FloatGrid, level_set};
-use frazil::{Context, Pool};
 
 const CELL: f64 = 0.01;
-
-fn context(threads: usize) -> Context {
-    Context::new(Pool::new(threads).unwrap())
-}
 
 fn snow(ctx: &Context) -> FloatGrid {
     let ground = Ground::Plane { height: 0.0, area: [-0.7, -0.5, 0.7, 0.5] };

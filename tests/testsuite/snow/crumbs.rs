@@ -1,6 +1,7 @@
 //! Crumbs: an island of few voxels is taken away with all that it held, a larger one stays.
 
 use crate::common::shapes::cuboid;
+use crate::program::Folder;
 use frazil::geometry::{TriMesh, Vec3};
 use frazil::motion::{Keys, Rigid};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
@@ -95,7 +96,7 @@ fn the_bytes_do_not_depend_on_the_threads() {
 
 #[test]
 fn a_scene_counts_its_crumbs() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let mesh = {
         let mut pose = Vec::new();
         let body = wall();
@@ -103,20 +104,18 @@ fn a_scene_counts_its_crumbs() {
         let positions = pose.iter().map(|p| p.cast()).collect();
         TriMesh { positions, triangles: body.motion().triangles().to_vec() }
     };
-    frazil::io::mesh::write(&folder.path().join("wall.obj"), &mesh).unwrap();
+    frazil::io::mesh::write(&folder.join("wall.obj"), &mesh).unwrap();
     let scene = "[shot]\nframes = \"1\"\n[snow]\nground = 0.0\narea = [-0.5, -0.5, 0.5, 0.5]\ndepth = 0.3\ncell = 0.02\n\
                  min_crumb = 1000\n[[object]]\nfile = \"wall.obj\"\nnoise = false\n";
-    std::fs::write(folder.path().join("shot.toml"), scene).unwrap();
+    std::fs::write(folder.join("shot.toml"), scene).unwrap();
     let run = std::process::Command::new(env!("CARGO_BIN_EXE_frazil"))
         .current_dir(folder.path())
         .args(["snow", "shot.toml", "-o", "out", "-q"])
         .output()
         .unwrap();
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-    let report = std::fs::read_to_string(folder.path().join("out/report/base.0001.json")).unwrap();
+    let report = std::fs::read_to_string(folder.join("out/report/base.0001.json")).unwrap();
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     assert_eq!(report["crumbs"], 1);
-    assert!(
-        std::fs::read_to_string(folder.path().join("out/scene.toml")).unwrap().contains("min_crumb = 1000")
-    );
+    assert!(std::fs::read_to_string(folder.join("out/scene.toml")).unwrap().contains("min_crumb = 1000"));
 }

@@ -1,6 +1,7 @@
 //! Limits of the motion of grains: pushes in a crowd, closing gaps, objects that jump.
 
 use super::grains::on_floor;
+use crate::common::liquids::context;
 use crate::common::shapes::sphere;
 use frazil::geometry::DVec3;
 use frazil::motion::{Key, Keys, Rigid};
@@ -9,13 +10,8 @@ use frazil::snow::base_layer::{BaseLayer, Params as BaseParams};
 use frazil::snow::grains::heap::{Colliders, Division, Heap};
 use frazil::snow::grains::{Base, Grains, Object, Params};
 use frazil::sweep::Body;
-use frazil::{Context, Pool};
 
 const FRAME: f64 = 1.0 / 24.0;
-
-fn context() -> Context {
-    Context::new(Pool::new(2).unwrap())
-}
 
 fn ball(positions: &[[f64; 3]]) -> Body {
     let key = |(frame, at): (i32, &[f64; 3])| Key {
@@ -43,7 +39,7 @@ fn grains_that_lie_in_each_other_part_by_half_a_diameter_in_a_sub_step() {
     }
     let division = Division { dt: 1.0e-3, sub_steps: 1 };
     let coefficients = params.coefficients(&division);
-    let ctx = context();
+    let ctx = context(2);
     let step = || heap.step(&ctx, division, coefficients, &mut Colliders::default());
     ctx.step(1, || ctx.phase("move", step)).unwrap();
     let ids = heap.ids().to_vec();
@@ -62,7 +58,7 @@ fn diameter(params: &Params) -> f64 {
 
 /// Largest speed (m/s) of a grain in six frames in which a ball is drawn through snow at a speed (m/s).
 fn fastest(speed: f64, sub_steps: u32) -> f64 {
-    let ctx = context();
+    let ctx = context(2);
     let cell = 0.02;
     let ground = Ground::Plane { height: 0.0, area: [-0.4, -0.3, 0.4, 0.3] };
     let snow = layer(&ctx, &ground, &[], &Cover::Depth(0.15), cell, 3.0).unwrap();
@@ -96,7 +92,7 @@ fn shorter_sub_steps_do_not_squeeze_grains_out_faster() {
 
 #[test]
 fn an_object_that_jumps_carries_no_grains_along() {
-    let ctx = context();
+    let ctx = context(2);
     let params = Params::for_cell(0.03);
     let mut grains = Grains::new(params).unwrap();
     let d = diameter(&params);

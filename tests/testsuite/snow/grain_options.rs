@@ -1,11 +1,13 @@
 //! Options of grains: rest by distance, and drag by local density.
 
+use super::grains::{in_air, on_floor};
+use crate::common::liquids::context;
 use crate::common::shapes::sphere;
+use frazil::Context;
 use frazil::geometry::DVec3;
 use frazil::motion::{Key, Keys, Rigid};
-use frazil::snow::grains::{Base, Grains, Object, Params, Surroundings};
+use frazil::snow::grains::{Base, Grains, Object, Params};
 use frazil::sweep::Body;
-use frazil::{Context, Pool};
 
 /// Radius of the grains and of the ball (m).
 const RADIUS: f64 = 0.004;
@@ -15,10 +17,6 @@ const OVER: f64 = 3.0 * RADIUS;
 const UNDER: f64 = RADIUS;
 /// The distance of the rule (m).
 const DISTANCE: f64 = 0.15;
-
-fn context(threads: usize) -> Context {
-    Context::new(Pool::new(threads).unwrap())
-}
 
 fn params() -> Params {
     Params { radius: RADIUS, active_distance: Some(DISTANCE), ..Params::for_cell(3.0 * RADIUS) }
@@ -34,14 +32,7 @@ fn ball(low: f64, time: f64, from: f64, to: f64) -> Body {
 /// Steps through a frame on a floor; how many rest then.
 fn step(ctx: &Context, grains: &mut Grains, body: Option<&Body>, frame: i32) -> usize {
     let objects: Vec<Object<'_>> = body.map(|body| Object::new(body, 0.3)).into_iter().collect();
-    let around = Surroundings {
-        base: Base::Missing,
-        objects: &objects,
-        statics: &[],
-        ground: &[],
-        floor: Some(0.0),
-        lowest: -1.0,
-    };
+    let around = on_floor(Base::Missing, &objects);
     let times = [frame - 1, frame].map(|frame| f64::from(frame) / 24.0);
     grains.step(ctx, &around, times, frame).unwrap().resting
 }
@@ -177,14 +168,7 @@ fn a_grain_among_others_feels_less_of_the_air() {
             Params { gravity: 0.0, air: 0.01, air_by_density, sub_steps: Some(sub_steps), ..params() };
         let mut grains = Grains::new(params).unwrap();
         grains.emit(&positions, &vec![[0.0, 1.0, 0.0]; positions.len()], 0).unwrap();
-        let around = Surroundings {
-            base: Base::Missing,
-            objects: &[],
-            statics: &[],
-            ground: &[],
-            floor: None,
-            lowest: -1.0,
-        };
+        let around = in_air(Base::Missing, &[]);
         grains.step(&ctx, &around, [0.0, dt], 1).unwrap();
         let mut speeds = vec![0.0; positions.len()];
         grains

@@ -1,24 +1,21 @@
 //! Single grains on slopes: they rest below an angle and slide above it.
 
+use super::grains::in_air;
 use frazil::geometry::DVec3;
 use frazil::snow::grain_friction::of_repose;
 use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap};
-use frazil::snow::grains::{Base, Grains, Params, Surroundings};
+use frazil::snow::grains::{Base, Grains, Params};
 use frazil::vdb::level_set::from_mesh;
-use frazil::{Context, Pool};
 
+use crate::common::liquids::context;
 use crate::common::shapes::cuboid;
 
 const CELL: f64 = 0.01;
 
-fn context() -> Context {
-    Context::new(Pool::new(1).unwrap())
-}
-
 /// A grain on a plane that leans, as gravity that leans.
 #[test]
 fn a_grain_slides_where_the_slope_is_steeper_than_its_friction() {
-    let ctx = context();
+    let ctx = context(1);
     let moved = |degrees: f64| {
         let params = Params { friction: 0.3, air: 1.0, ..Params::for_cell(CELL) };
         let mut heap = Heap::new(2.0 * params.radius);
@@ -45,7 +42,7 @@ fn a_grain_slides_where_the_slope_is_steeper_than_its_friction() {
 #[test]
 fn a_grain_lies_on_a_base_up_to_its_angle_of_repose() {
     const REPOSE: f64 = 30.0;
-    let ctx = context();
+    let ctx = context(1);
     let slid = |degrees: f64, attraction: f64| {
         let (sine, cosine) = degrees.to_radians().sin_cos();
         let mut slab = cuboid([1.2, 0.2, 0.2]);
@@ -59,14 +56,7 @@ fn a_grain_lies_on_a_base_up_to_its_angle_of_repose() {
             Grains::new(Params { friction, attraction, air: 1.0, ..Params::for_cell(CELL) }).unwrap();
         let above = grains.params().radius * 1.001;
         grains.emit(&[DVec3::new(-sine * above, cosine * above, 0.0)], &[], 0).unwrap();
-        let around = Surroundings {
-            base: Base::Whole([&base; 2]),
-            objects: &[],
-            statics: &[],
-            ground: &[],
-            floor: None,
-            lowest: -1.0,
-        };
+        let around = in_air(Base::Whole([&base; 2]), &[]);
         for frame in 1..=12 {
             let times = [frame - 1, frame].map(|frame| f64::from(frame) / 24.0);
             grains.step(&ctx, &around, times, frame).unwrap();
@@ -83,7 +73,7 @@ fn a_grain_lies_on_a_base_up_to_its_angle_of_repose() {
 
 /// Lets a heap move for some frames on a floor that leans by so many degrees toward greater x.
 fn step_on_floor(heap: &mut Heap, params: &Params, floor: f32, degrees: f64, frames: usize) {
-    let ctx = context();
+    let ctx = context(1);
     let division = Division { dt: 1.0 / 24.0, sub_steps: params.sub_steps(1.0 / 24.0, 0.0) };
     let mut coefficients = params.coefficients(&division);
     let (sine, cosine) = degrees.to_radians().sin_cos();

@@ -1,6 +1,8 @@
 //! Grains of a small layer into which a ball is pressed: balances, the same bytes whatever does the work, damage.
 
+use crate::common::liquids::context;
 use crate::common::shapes::sphere;
+use frazil::Context;
 use frazil::geometry::points::Values;
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Key, Keys, Rigid};
@@ -10,14 +12,9 @@ use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap, Shell};
 use frazil::snow::grains::{Base, Grains, Object, PACKING, Params, Surroundings, removals};
 use frazil::sweep::Body;
 use frazil::vdb::FloatGrid;
-use frazil::{Context, Pool};
 
 const CELL: f64 = 0.01;
 const FRAMES: i32 = 12;
-
-fn context(threads: usize) -> Context {
-    Context::new(Pool::new(threads).unwrap())
-}
 
 /// A ball that is pressed 6 cm into the snow and drawn through it.
 fn ball() -> Body {
@@ -52,6 +49,11 @@ fn story(ctx: &Context) -> Story {
 /// Objects over a level ground.
 pub fn on_floor<'a>(base: Base<'a>, objects: &'a [Object<'a>]) -> Surroundings<'a> {
     Surroundings { base, objects, statics: &[], ground: &[], floor: Some(0.0), lowest: -1.0 }
+}
+
+/// Where there is no floor.
+pub fn in_air<'a>(base: Base<'a>, objects: &'a [Object<'a>]) -> Surroundings<'a> {
+    Surroundings { floor: None, ..on_floor(base, objects) }
 }
 
 fn params() -> Params {
@@ -166,14 +168,8 @@ fn a_layer_that_remembers_its_changed_blocks_gives_the_same_grains() {
         let time = |frame: i32| f64::from(frame) / 24.0;
         let times = [time(frame - 1), time(frame)];
         base.step(&ctx, &[ball()], times[0], times[1], frame).unwrap();
-        let around = Surroundings {
-            base: Base::Changed(base.surface(), base.before()),
-            objects: &[Object::new(&story.body, 0.3)],
-            statics: &[],
-            ground: &[],
-            floor: Some(0.0),
-            lowest: -1.0,
-        };
+        let objects = [Object::new(&story.body, 0.3)];
+        let around = on_floor(Base::Changed(base.surface(), base.before()), &objects);
         changed.step(&ctx, &around, times, frame).unwrap();
     }
     assert!(changed.count() > 500);
@@ -204,14 +200,7 @@ fn loose_grains_are_added_or_refused_all_together() {
         assert!(error.contains(words), "{error}");
         assert!(grains.save() == before);
     }
-    let around = Surroundings {
-        base: Base::Missing,
-        objects: &[],
-        statics: &[],
-        ground: &[],
-        floor: None,
-        lowest: -1.0,
-    };
+    let around = in_air(Base::Missing, &[]);
     let report = grains.step(&ctx, &around, [0.0, 0.1], 6).unwrap();
     assert_eq!((report.count, report.born, report.removed_volume), (3, 0, 0.0));
     let mut ids = grains.ids().to_vec();
@@ -231,14 +220,7 @@ fn too_many_grains_are_refused_and_leave_the_others_as_they_were() {
     let mut grains = Grains::new(Params { most: 200, ..params() }).unwrap();
     run(&ctx, &story, &mut grains, 1..=3);
     let before = grains.save();
-    let around = Surroundings {
-        base: Base::Whole([&story.layers[3], &story.layers[FRAMES as usize]]),
-        objects: &[],
-        statics: &[],
-        ground: &[],
-        floor: Some(0.0),
-        lowest: -1.0,
-    };
+    let around = on_floor(Base::Whole([&story.layers[3], &story.layers[FRAMES as usize]]), &[]);
     let error = grains.step(&ctx, &around, [0.0, 1.0 / 24.0], 4).unwrap_err();
     assert!(error.to_string().contains("max = 200"), "{error}");
     assert!(grains.save() == before);
@@ -405,14 +387,7 @@ fn grains_that_rest_wake_when_the_base_below_them_or_gravity_changes() {
     run(&ctx, &story, &mut grains, 1..=FRAMES);
     let last = &story.layers[FRAMES as usize];
     let step = |grains: &mut Grains, base: [&FloatGrid; 2]| {
-        let around = Surroundings {
-            base: Base::Whole(base),
-            objects: &[],
-            statics: &[],
-            ground: &[],
-            floor: Some(0.0),
-            lowest: -1.0,
-        };
+        let around = on_floor(Base::Whole(base), &[]);
         grains.step(&ctx, &around, [0.0, 1.0 / 24.0], 99).unwrap().resting
     };
     let mut resting = 0;
@@ -425,22 +400,13 @@ fn grains_that_rest_wake_when_the_base_below_them_or_gravity_changes() {
     let mut same = Grains::resume(params(), &grains.save()).unwrap();
     assert!(step(&mut same, [last, last]) >= resting);
     // Nor may they rest on a floor that has gone.
-    let around = Surroundings {
-        base: Base::Whole([last, last]),
-        objects: &[],
-        statics: &[],
-        ground: &[],
-        floor: None,
-        lowest: -1.0,
-    };
+    let around = in_air(Base::Whole([last, last]), &[]);
     assert_eq!(same.step(&ctx, &around, [0.0, 1.0 / 24.0], 99).unwrap().resting, 0);
     // Nor on an object that has jumped.
     let mut beside = Grains::resume(params(), &grains.save()).unwrap();
     let mut at = |from: f64, objects: &[Object<'_>]| {
         let base = Base::Whole([last, last]);
-        let around =
-            Surroundings { base, objects, statics: &[], ground: &[], floor: Some(0.0), lowest: -1.0 };
-        beside.step(&ctx, &around, [from, from + 1.0 / 24.0], 99).unwrap().resting
+        beside.step(&ctx, &on_floor(base, objects), [from, from + 1.0 / 24.0], 99).unwrap().resting
     };
     let far = ball();
     // It stands still from 0.5 s on; where it was before is elsewhere.
@@ -478,14 +444,8 @@ fn snow_is_pressed_together_as_the_object_that_took_it_says() {
             pushes: false,
             ..Object::new(&bodies[index], 0.3)
         };
-        let around = Surroundings {
-            base: Base::Whole([&before, base.surface()]),
-            objects: &[object(0), object(1)],
-            statics: &[],
-            ground: &[],
-            floor: None,
-            lowest: -1.0,
-        };
+        let objects = [object(0), object(1)];
+        let around = in_air(Base::Whole([&before, base.surface()]), &objects);
         let mut grains = Grains::new(params()).unwrap();
         let report = grains.step(&ctx, &around, [0.0, 1.0 / 24.0], 1).unwrap();
         let left = grains.rests().filter(|rest| rest[0] < 0.0).count();
@@ -506,14 +466,7 @@ fn grains_grow_old_and_leave_their_box() {
     let ctx = context(1);
     let mut grains = Grains::new(Params { lifetime: Some(0.25), gravity: 0.0, ..params() }).unwrap();
     grains.emit(&[DVec3::zeros(), DVec3::new(0.1, 0.0, 0.0)], &[[0.0; 3], [1.0, 0.0, 0.0]], 3).unwrap();
-    let around = Surroundings {
-        base: Base::Missing,
-        objects: &[],
-        statics: &[],
-        ground: &[],
-        floor: None,
-        lowest: -1.0,
-    };
+    let around = in_air(Base::Missing, &[]);
     let step = |grains: &mut Grains, frame: i32| {
         let report = grains.step(&ctx, &around, [0.0, 1.0 / 24.0], frame).unwrap();
         (report.count, report.expired, report.dropped)

@@ -1,9 +1,10 @@
 //! Objects with holes: grains stay out of small ones, and lie in what is wide open.
 
+use super::grains::in_air;
 use crate::common::shapes::sphere;
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Key, Keys, Rigid};
-use frazil::snow::grains::{Base, Grains, Object, Params, Surroundings};
+use frazil::snow::grains::{Base, Grains, Object, Params};
 use frazil::sweep::Body;
 use frazil::{Context, Pool};
 
@@ -21,14 +22,8 @@ fn height_below(end: f32) -> f64 {
     let params = Params { gravity: 0.0, ..Params::for_cell(0.01) };
     let mut grains = Grains::new(params).unwrap();
     grains.emit(&[DVec3::new(0.001, -0.05, 0.002)], &[], 0).unwrap();
-    let around = Surroundings {
-        base: Base::Missing,
-        objects: &[Object::new(&body, 0.3)],
-        statics: &[],
-        ground: &[],
-        floor: None,
-        lowest: -1.0,
-    };
+    let objects = [Object::new(&body, 0.3)];
+    let around = in_air(Base::Missing, &objects);
     let ctx = Context::new(Pool::new(2).unwrap());
     for frame in 1..=24 {
         let times = [frame - 1, frame].map(|frame| f64::from(frame) / 24.0);

@@ -1,16 +1,12 @@
 //! The snow before anything moves, against the volumes that it must have.
 
+use crate::common::liquids::context;
 use crate::common::shapes::cuboid;
 use frazil::geometry::{TriMesh, Vec3};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::vdb::{FloatGrid, level_set};
-use frazil::{Context, Pool};
 
 const CELL: f64 = 0.02;
-
-fn context() -> Context {
-    Context::new(Pool::new(2).unwrap())
-}
 
 /// A square metre of n x n squares at heights h(x, z).
 fn sheet(n: usize, height: impl Fn(f32, f32) -> f32) -> TriMesh {
@@ -52,7 +48,7 @@ fn soup(mesh: &TriMesh) -> TriMesh {
 
 #[track_caller]
 fn holds(ground: &Ground, statics: &[TriMesh], cover: &Cover, volume: f64) -> FloatGrid {
-    let ctx = context();
+    let ctx = context(2);
     let grid = layer(&ctx, ground, statics, cover, CELL, 3.0).unwrap();
     let found = level_set::measure(&ctx, &grid).unwrap().volume;
     assert!((found / volume - 1.0).abs() < 0.015, "{found} m3, not {volume}");
@@ -81,7 +77,7 @@ fn snow_lies_on_static_objects_and_not_in_them() {
 
 #[test]
 fn a_wall_that_leans_by_a_hair_holds_no_snow() {
-    let ctx = context();
+    let ctx = context(2);
     let volume = |wider: f32| {
         let mut block = cuboid([1.0, 1.0, 1.0]);
         block
@@ -115,7 +111,7 @@ fn a_top_surface_bounds_what_lies_over_the_ground() {
 
 #[test]
 fn no_snow_and_no_depth_are_refused() {
-    let ctx = context();
+    let ctx = context(2);
     let sunk = Cover::Top(sheet(4, |_, _| -1.0));
     for cover in [Cover::Depth(0.0), Cover::Depth(f64::NAN), sunk] {
         assert!(layer(&ctx, &plane(), &[], &cover, CELL, 3.0).is_err());

@@ -6,16 +6,13 @@ use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::mist::{Around, Boundary, Grids, Mist, Params, Source, Start, Surroundings, Wind};
 use frazil::sweep::Body;
-use frazil::{Context, Error, Pool};
+use frazil::{Context, Error};
 
+use crate::common::liquids::context;
 use crate::common::shapes::{cuboid, sphere};
 
 const CELL: f64 = 0.02;
 const FRAME: f64 = 1.0 / 24.0;
-
-fn context(threads: usize) -> Context {
-    Context::new(Pool::new(threads).unwrap())
-}
 
 fn open(tiles: &Tiles, _: f32, _: f64) -> frazil::Result<Solids> {
     Ok(Solids::none(tiles))

@@ -1,6 +1,8 @@
 //! A layer's saved state: a layer resumed from it equals one that never stopped, and damaged states are refused.
 
+use crate::common::liquids::context;
 use crate::common::shapes::sphere;
+use frazil::Context;
 use frazil::geometry::DVec3;
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
@@ -8,13 +10,8 @@ use frazil::snow::base_layer::{BaseLayer, Params};
 use frazil::sweep::Body;
 use frazil::vdb::FloatGrid;
 use frazil::vdb::file::{WriteOptions, to_bytes};
-use frazil::{Context, Pool};
 
 const CELL: f64 = 0.01;
-
-fn context(threads: usize) -> Context {
-    Context::new(Pool::new(threads).unwrap())
-}
 
 fn snow(ctx: &Context, depth: f64) -> FloatGrid {
     let ground = Ground::Plane { height: 0.0, area: [-0.7, -0.5, 0.7, 0.5] };

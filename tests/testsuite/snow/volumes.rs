@@ -1,18 +1,15 @@
 //! Densities and the united surface against formulas, and the same bytes whatever does the work.
 
+use crate::common::liquids::context;
+use frazil::Context;
 use frazil::geometry::DVec3;
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::render_volumes::{fog, united};
 use frazil::vdb::file::to_bytes;
 use frazil::vdb::{FloatGrid, GridClass, MetaValue, level_set};
-use frazil::{Context, Pool};
 
 const CELL: f64 = 0.02;
 const RADIUS: f64 = CELL / 3.0;
-
-fn context(threads: usize) -> Context {
-    Context::new(Pool::new(threads).unwrap())
-}
 
 /// Snow 0.15 m deep on a square.
 fn snow(ctx: &Context) -> FloatGrid {

@@ -8,7 +8,7 @@ use frazil::geometry::points::{Attribute, Column, Points, Values};
 use frazil::io::{mesh, particles};
 
 use crate::common::liquids::filled;
-use crate::program::{command, fails, works};
+use crate::program::{Folder, command, fails, works};
 
 /// A drop of 2,109 particles, 0.1 m apart, as text.
 fn write_drop(folder: &Path) {
@@ -19,8 +19,7 @@ fn write_drop(folder: &Path) {
 
 #[test]
 fn a_drop_becomes_a_closed_mesh_and_a_level_set() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_drop(folder);
     works(folder, "vdb from-particles drop.xyz --mesh drop.ply -o drop.vdb --spacing 0.1 --threads 1");
     works(folder, "vdb from-particles drop.xyz --mesh again.ply -o again.vdb --spacing 0.1 --threads 2");
@@ -55,8 +54,7 @@ fn a_drop_becomes_a_closed_mesh_and_a_level_set() {
 
 #[test]
 fn specks_go_a_box_cuts_and_attributes_come_along() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let mut positions = filled(0.1, 0.1, 1.0, |position| position.norm() < 0.8);
     let whole = positions.len();
     positions.extend((0..5).map(|n| DVec3::new(3.0, 0.1 * f64::from(n), 0.0)));
@@ -96,8 +94,7 @@ fn specks_go_a_box_cuts_and_attributes_come_along() {
 
 #[test]
 fn what_makes_no_surface_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_drop(folder);
     fs::write(folder.join("few.xyz"), "0 0 0\n1 0 0\n").unwrap();
     fs::write(folder.join("wild.xyz"), "0 0 0\nnan 0 0\n").unwrap();

@@ -4,13 +4,12 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use frazil::geometry::points::{Attribute, Column, Values};
-use frazil::geometry::{DVec3, DetailedMesh, Points, Vec3};
-use frazil::io::{mesh, particles};
+use frazil::geometry::{DVec3, DetailedMesh, Vec3};
 
 use crate::common::character::{are_same, output};
+use crate::common::followed::{frame, values, write_numbered};
 use crate::common::liquids::ball;
-use crate::program::{command, fails, kill_at, works};
+use crate::program::{Folder, command, fails, kill_at, works};
 
 /// Initial distance between particles (m).
 const SPACING: f64 = 0.01;
@@ -39,16 +38,8 @@ fn write_shot(folder: &Path) {
         let middle = |side: f64| (DVec3::new(8.26 - 0.26 * time, 0.1, 0.2) * side + drift) * SPACING;
         let moved = |by: DVec3| one.positions.iter().map(move |position| position + by);
         let positions: Vec<DVec3> = moved(middle(-1.0)).chain(moved(middle(1.0))).collect();
-        let mut points = Points::at(1.0, &positions).unwrap();
-        let ids = Values::Long(Column::Each((0..positions.len() as i64).collect()));
-        points.attributes.push(Attribute { name: "id".into(), values: ids });
-        particles::write(&path(folder, frame), &points, false).unwrap();
+        write_numbered(&path(folder, frame), &positions, 0);
     }
-}
-
-/// A frame's mesh as it was written.
-fn frame(folder: &Path, out: &str, frame: i32) -> DetailedMesh {
-    mesh::read_detailed(&folder.join(format!("{out}/surface/surface.{frame:04}.ply"))).unwrap()
 }
 
 /// Those of all frames.
@@ -61,13 +52,9 @@ fn state(folder: &Path, out: &str, frame: i32) -> Vec<u8> {
     fs::read(folder.join(format!("{out}/state/surface.{frame:04}.surface"))).unwrap()
 }
 
-fn array<'a>(mesh: &'a DetailedMesh, name: &str) -> &'a [f64] {
-    &mesh.arrays.iter().find(|array| array.name == name).unwrap_or_else(|| panic!("no {name}")).values
-}
-
 /// Where the vertices of a frame are in the next (m), as their velocities say.
 fn led(mesh: &DetailedMesh) -> Vec<DVec3> {
-    let [x, y, z] = ["vx", "vy", "vz"].map(|name| array(mesh, name));
+    let [x, y, z] = ["vx", "vy", "vz"].map(|name| values(mesh, name));
     let position = |(vertex, position): (usize, &Vec3)| {
         position.cast::<f64>() + DVec3::new(x[vertex], y[vertex], z[vertex]) / 24.0
     };
@@ -144,8 +131,7 @@ fn velocities_lead_on(shown: &[DetailedMesh], own: &[DetailedMesh]) -> usize {
 
 #[test]
 fn what_a_change_takes_away_sets_out_before_it_and_the_states_are_those_without() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder);
     works(folder, &format!("{SHOT} -o usual"));
     for ahead in [0, 1] {
@@ -171,8 +157,7 @@ fn what_a_change_takes_away_sets_out_before_it_and_the_states_are_those_without(
 
 #[test]
 fn threads_kills_and_frames_made_again_give_the_same_bytes() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder);
     let shot = format!("{SHOT} --set output.surface=[\"ply\",\"usd\",\"obj\"]");
     works(folder, &format!("{shot} -o whole --threads 2"));
@@ -198,8 +183,7 @@ fn threads_kills_and_frames_made_again_give_the_same_bytes() {
 
 #[test]
 fn a_shot_sees_what_its_cache_has_beyond_it_also_when_that_comes_later() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder);
     works(folder, &format!("{SHOT} -o whole"));
     works(folder, &format!("{SHORT} -o short"));

@@ -8,7 +8,7 @@ use frazil::geometry::DVec3;
 use frazil::geometry::points::{Column, Points, Values};
 use frazil::io::{mesh, particles};
 
-use crate::program::{fails, works};
+use crate::program::{Folder, fails, works};
 
 /// Particles of a box, 0.1 m apart, at a frame; or none.
 fn write(folder: &Path, number: i32, is_full: bool) {
@@ -28,8 +28,7 @@ fn triangles(path: &Path) -> Option<usize> {
 
 #[test]
 fn frames_without_particles_get_empty_meshes_and_liquid_comes_back() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let is_full = |number: i32| ![1, 2, 6, 7].contains(&number);
     (1..=9).for_each(|number| write(folder, number, is_full(number)));
     let make = "vdb from-particles p.%04d.bgeo --frames 1-9 --spacing 0.1 --mesh a.%04d.ply -o a.%04d.vdb";
@@ -66,8 +65,7 @@ fn are_same(folder: &Path, run: &str, frames: RangeInclusive<i32>) {
 
 #[test]
 fn frames_before_a_missing_file_are_made_and_the_rest_when_it_comes() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     (1..=8).filter(|number| *number != 6).for_each(|number| write(folder, number, true));
     let run = "surface -p p.%04d.bgeo --spacing 0.1 -o out --set shot.frames=1-8";
     fails(folder, run, 1, &["p.0006.bgeo"]);
@@ -82,8 +80,7 @@ fn frames_before_a_missing_file_are_made_and_the_rest_when_it_comes() {
 
 #[test]
 fn check_and_run_warn_of_ids_that_are_row_numbers() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     for number in 1..=3 {
         // The rows of each frame are turned by one layer, so that rows name other particles though nothing moves.
         let position = |n: usize| DVec3::new((n / 36) as f64, (n / 6 % 6) as f64, (n % 6) as f64) * 0.1;

@@ -11,7 +11,7 @@ use frazil::vdb::file::{self, WriteOptions};
 use frazil::vdb::{FloatGrid, GridClass, level_set};
 
 use crate::common::liquids::{context, filled};
-use crate::program::{GRAINS, fails, works};
+use crate::program::{Folder, GRAINS, fails, works};
 
 /// Spacing and cell (m) of the drop.
 const SPACING: f64 = 0.1;
@@ -62,8 +62,7 @@ fn roughness(mesh: &TriMesh) -> f64 {
 
 #[test]
 fn a_sphere_around_a_particle_has_the_volume_of_a_sphere() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     fs::write(folder.join("one.xyz"), "0.013 0.02 -0.01\n").unwrap();
     fs::write(folder.join("two.xyz"), "0 0 0\n0.2 0 0\n").unwrap();
     let make = "--method spheres --spacing 0.2 --cell 0.0125 --mesh out.ply -o out.vdb";
@@ -86,8 +85,7 @@ fn a_sphere_around_a_particle_has_the_volume_of_a_sphere() {
 
 #[test]
 fn smoothing_keeps_the_volume_takes_lumps_away_and_the_level_set_follows() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_drop(folder, "drop.bgeo");
     for (method, parts) in [("solenthaler", [0.95, 0.93]), ("spheres", [0.9, 0.65])] {
         let make = format!("vdb from-particles drop.bgeo --method {method} --spacing 0.1 --cell 0.05");
@@ -110,8 +108,7 @@ fn smoothing_keeps_the_volume_takes_lumps_away_and_the_level_set_follows() {
 
 #[test]
 fn a_box_takes_half_of_a_drop_whatever_its_cells() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_drop(folder, "drop.bgeo");
     let make = "vdb from-particles drop.bgeo --spacing 0.1";
     works(folder, &format!("{make} --mesh whole.ply"));
@@ -147,8 +144,7 @@ fn a_box_takes_half_of_a_drop_whatever_its_cells() {
 
 #[test]
 fn each_frame_has_its_colliders_and_threads_change_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     for frame in [1, 2] {
         write_drop(folder, &format!("drop.000{frame}.bgeo"));
         write_half(folder, &format!("moving.000{frame}.vdb"), frame - 1, "--cell 0.04");
@@ -174,8 +170,7 @@ fn each_frame_has_its_colliders_and_threads_change_nothing() {
 
 #[test]
 fn what_cannot_be_cut_out_is_refused_before_any_work() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_drop(folder, "drop.bgeo");
     for frame in [1, 2] {
         write_drop(folder, &format!("drop.000{frame}.bgeo"));
@@ -228,8 +223,7 @@ fn what_cannot_be_cut_out_is_refused_before_any_work() {
 
 #[test]
 fn where_solids_take_all_nothing_is_left_and_said() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_drop(folder, "drop.bgeo");
     mesh::write(&folder.join("all.obj"), &TriMesh::cuboid([-2.0; 3], [2.0; 3])).unwrap();
     works(folder, "vdb from-mesh all.obj --cell 0.1 -o all.vdb");
@@ -251,8 +245,7 @@ fn where_solids_take_all_nothing_is_left_and_said() {
 
 #[test]
 fn of_a_huge_solid_only_what_lies_in_the_liquid_counts() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_drop(folder, "drop.bgeo");
     // On the liquid's cells its surface would take terabytes.
     let huge = TriMesh::cuboid([0.0, -2000.0, -2000.0], [4000.0, 2000.0, 2000.0]);
@@ -273,8 +266,7 @@ fn of_a_huge_solid_only_what_lies_in_the_liquid_counts() {
 
 #[test]
 fn all_level_sets_of_a_file_are_cut_out() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_drop(folder, "drop.bgeo");
     let halves = [("one", 0), ("other", 1)].map(|(name, axis)| {
         write_half(folder, "half.vdb", axis, "--cell 0.04");
@@ -292,8 +284,7 @@ fn all_level_sets_of_a_file_are_cut_out() {
 
 #[test]
 fn options_that_would_do_nothing_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let positions = filled(SPACING, 0.1, 1.0, |position| position.norm() < 0.4);
     let mut points = Points::at(1.0, &positions).unwrap();
     let speed = Values::Vector(Column::Each(vec![[1.0, 2.0, 3.0]; positions.len()]));
@@ -316,8 +307,7 @@ fn options_that_would_do_nothing_are_refused() {
 
 #[test]
 fn cells_follow_small_spheres() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     fs::write(folder.join("one.xyz"), "0 0 0\n").unwrap();
     works(folder, "vdb from-particles one.xyz --method spheres --spacing 0.2 --radius 0.12 --mesh out.ply");
     near(read(folder, "out.ply").volume(), 4.0 / 3.0 * PI * 0.12f64.powi(3), 0.2);

@@ -5,18 +5,18 @@ use std::fs;
 use std::path::Path;
 
 use frazil::geometry::check::topology::{Topology, bodies};
-use frazil::geometry::mesh::attributes::{MeshArray, Number, On};
-use frazil::geometry::points::{Attribute, Column, Values};
-use frazil::geometry::{DVec3, DetailedMesh, Points, TriMesh, Uvs, Vec3};
-use frazil::io::{mesh, particles};
+use frazil::geometry::mesh::attributes::{Number, On};
+use frazil::geometry::{DVec3, DetailedMesh, TriMesh, Uvs, Vec3};
+use frazil::io::mesh;
 use serde_json::json;
 
 use crate::common::character::{are_same, output};
 use crate::common::clients;
+use crate::common::followed::{array, frame, reported, values, write_mesh, write_numbered};
 use crate::common::liquids::ball;
 use crate::common::shapes::welded;
 use crate::common::usda::numbers;
-use crate::program::{kill_at, works};
+use crate::program::{Folder, kill_at, works};
 
 /// Initial distance between particles (m).
 const SPACING: f64 = 0.01;
@@ -42,18 +42,10 @@ fn middle(side: f64, frame: i32) -> DVec3 {
     DVec3::new(7.25 - 0.25 * nearer, 0.1, 0.2) * (SPACING * side)
 }
 
-fn write_particles(path: &Path, positions: &[DVec3], first_id: i64) {
-    let mut points = Points::at(1.0, positions).unwrap();
-    let ids = Values::Long(Column::Each((first_id..first_id + positions.len() as i64).collect()));
-    points.attributes.push(Attribute { name: "id".into(), values: ids });
-    particles::write(path, &points, false).unwrap();
-}
-
 /// A mesh with colours, another number of its own for each vertex and each triangle, and texture coordinates in charts: u is the
 /// number of the chart, give or take less than a half.
 fn detailed(mesh: TriMesh) -> DetailedMesh {
     let (vertices, faces) = (mesh.positions.len(), mesh.triangles.len());
-    let array = |name: &str, on, number, values| MeshArray { name: name.into(), on, number, values };
     let counted = |count: usize| -> Vec<f64> { (0..count).map(|n| n as f64).collect() };
     let colour = |by: usize| -> Vec<f64> { (0..vertices).map(|n| (by * n % 251) as f64).collect() };
     let arrays = vec![
@@ -78,7 +70,7 @@ fn write_shot(folder: &Path) -> DetailedMesh {
     for frame in 1..=FRAMES {
         let moved = |side: f64| one.positions.iter().map(move |place| place + middle(side, frame));
         let places: Vec<DVec3> = moved(-1.0).chain(moved(1.0)).collect();
-        write_particles(&folder.join(format!("two.{frame:04}.bgeo")), &places, 0);
+        write_numbered(&folder.join(format!("two.{frame:04}.bgeo")), &places, 0);
     }
     let whole = welded(&one.mesh);
     let mut both = TriMesh::default();
@@ -88,35 +80,16 @@ fn write_shot(folder: &Path) -> DetailedMesh {
         both.append(&TriMesh { positions, triangles: whole.triangles.clone() });
     }
     let detail = detailed(both);
-    let arrays: Vec<&MeshArray> = detail.arrays.iter().collect();
-    let carried = mesh::Carried { uvs: detail.uvs.as_ref(), arrays: &arrays, ..Default::default() };
     let path = folder.join("two.ply");
-    mesh::write_carried(&path, &detail.mesh, &carried).unwrap();
+    write_mesh(&path, &detail);
     // As the program reads it.
     mesh::read_detailed(&path).unwrap()
-}
-
-/// A frame's mesh as it was written.
-fn frame(folder: &Path, out: &str, frame: i32) -> DetailedMesh {
-    mesh::read_detailed(&folder.join(format!("{out}/surface/surface.{frame:04}.ply"))).unwrap()
-}
-
-fn array<'a>(mesh: &'a DetailedMesh, name: &str) -> &'a [f64] {
-    &mesh.arrays.iter().find(|array| array.name == name).unwrap_or_else(|| panic!("no {name}")).values
 }
 
 /// The texture coordinates of a triangle's corners.
 fn coordinates(mesh: &DetailedMesh, triangle: usize) -> [[f32; 2]; 3] {
     let uvs = mesh.uvs.as_ref().expect("texture coordinates");
     uvs.indices(&mesh.mesh.triangles, triangle).map(|index| uvs.coordinates[index as usize])
-}
-
-/// A number of a frame's report.
-#[track_caller]
-fn reported(folder: &Path, out: &str, frame: i32, key: &str) -> u64 {
-    let text = fs::read(folder.join(format!("{out}/report/surface.{frame:04}.json"))).unwrap();
-    let report: serde_json::Value = serde_json::from_slice(&text).unwrap();
-    report[key].as_u64().unwrap_or_else(|| panic!("{key} of frame {frame} is {}", report[key]))
 }
 
 #[track_caller]
@@ -133,11 +106,11 @@ fn is_whole(mesh: &TriMesh, frame: i32) {
 fn carries_all(now: &DetailedMesh, first: &DetailedMesh, frame: i32) {
     let (vertices, faces) = (now.mesh.positions.len(), now.mesh.triangles.len());
     for name in ["red", "green", "blue", "mask", "vx", "vy", "vz", "delta", "flagged"] {
-        let values = array(now, name);
+        let values = values(now, name);
         assert_eq!(values.len(), vertices, "{name} at frame {frame}");
         assert!(values.iter().all(|value| value.is_finite()), "{name} at frame {frame}");
     }
-    let part = array(now, "part");
+    let part = values(now, "part");
     assert_eq!(part.len(), faces, "frame {frame}");
     for (triangle, number) in part.iter().enumerate() {
         assert!((0.0..first.mesh.triangles.len() as f64).contains(number), "part {number} at frame {frame}");
@@ -160,7 +133,7 @@ fn far_is_as_it_was(now: &DetailedMesh, first: &DetailedMesh, frame: i32) {
         let (at, nearest) = off.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
         assert!(nearest < 0.1, "vertex {vertex} is gone at frame {frame}: {nearest} spacings");
         for name in ["red", "green", "blue", "mask"] {
-            let [was, is] = [array(first, name)[vertex as usize], array(now, name)[at]];
+            let [was, is] = [values(first, name)[vertex as usize], values(now, name)[at]];
             assert_eq!(was, is, "{name} of vertex {vertex} at frame {frame}");
         }
         names[at] = Some(vertex);
@@ -168,7 +141,7 @@ fn far_is_as_it_was(now: &DetailedMesh, first: &DetailedMesh, frame: i32) {
     let mut stayed = 0;
     for (triangle, corners) in now.mesh.triangles.iter().enumerate() {
         let [Some(a), Some(b), Some(c)] = corners.map(|corner| names[corner as usize]) else { continue };
-        let number = array(now, "part")[triangle] as usize;
+        let number = values(now, "part")[triangle] as usize;
         let (own, positions) = (first.mesh.triangles[number], coordinates(first, number));
         for (vertex, is) in [a, b, c].into_iter().zip(coordinates(now, triangle)) {
             let corner = own.iter().position(|other| *other == vertex);
@@ -184,8 +157,7 @@ fn far_is_as_it_was(now: &DetailedMesh, first: &DetailedMesh, frame: i32) {
 
 #[test]
 fn balls_meet_and_part_and_the_rest_of_the_mesh_stays_as_it_is() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let first = write_shot(folder);
     let said = works(folder, &format!("{SHOT} -o out"));
     assert!(!said.contains("repaired"), "{said}");
@@ -222,12 +194,11 @@ fn balls_meet_and_part_and_the_rest_of_the_mesh_stays_as_it_is() {
 
 #[test]
 fn velocities_lead_to_the_next_frame_and_stay_small_where_it_is_another_mesh() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder);
     works(folder, &format!("{SHOT} -o out"));
     let ways = |now: &DetailedMesh| -> Vec<DVec3> {
-        let [x, y, z] = ["vx", "vy", "vz"].map(|name| array(now, name));
+        let [x, y, z] = ["vx", "vy", "vz"].map(|name| values(now, name));
         (0..x.len()).map(|vertex| DVec3::new(x[vertex], y[vertex], z[vertex]) / 24.0).collect()
     };
     let (mut same, mut others) = (0, 0);
@@ -258,8 +229,7 @@ fn velocities_lead_to_the_next_frame_and_stay_small_where_it_is_another_mesh() {
 
 #[test]
 fn threads_kills_and_frames_made_again_give_the_same_bytes() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder);
     let shot = format!("{MEETING} --set output.surface=[\"ply\",\"usd\",\"obj\"]");
     works(folder, &format!("{shot} -o whole --threads 2"));
@@ -284,8 +254,7 @@ fn threads_kills_and_frames_made_again_give_the_same_bytes() {
 
 #[test]
 fn a_mesh_that_is_not_rebuilt_keeps_its_triangles_and_is_flagged() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let first = write_shot(folder);
     works(folder, &format!("{MEETING} -o out --set surface.rebuild=false"));
     let mut flagged = 0;
@@ -299,15 +268,14 @@ fn a_mesh_that_is_not_rebuilt_keeps_its_triangles_and_is_flagged() {
         for key in ["changed_cells", "rebuilt_cells", "made_triangles", "matching_iterations"] {
             assert_eq!(reported(folder, "out", number, key), 0, "{key} at frame {number}");
         }
-        flagged += array(&now, "flagged").iter().filter(|flag| **flag == 1.0).count();
+        flagged += values(&now, "flagged").iter().filter(|flag| **flag == 1.0).count();
     }
     assert!(flagged > 0);
 }
 
 #[test]
 fn an_open_mesh_is_closed_first_and_that_is_said() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let mut open = write_shot(folder).mesh;
     // Two holes, of two triangles and of one.
     for triangle in [1230, 201, 200] {
@@ -345,8 +313,7 @@ const PRIMVARS: [(&str, &str, &str, &[&str]); 6] = [
 
 #[test]
 fn usd_has_other_faces_from_frame_to_frame_and_primvars_that_fit_them() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder);
     works(folder, &format!("{SHOT} -o out --set shot.frames=1-7 --set output.surface=[\"ply\",\"usd\"]"));
     let file = |name: &str| folder.join("out").join(name);
@@ -374,7 +341,7 @@ fn usd_has_other_faces_from_frame_to_frame_and_primvars_that_fit_them() {
                 "displayColor" => f64::from(array[at] as f32 / 255.0),
                 _ => array[at],
             };
-            let arrays: Vec<&[f64]> = arrays.iter().map(|name| array(&made, name)).collect();
+            let arrays: Vec<&[f64]> = arrays.iter().map(|name| values(&made, name)).collect();
             let of_one = |at: usize| -> Vec<f64> { arrays.iter().map(|array| value(array, at)).collect() };
             let values: Vec<Vec<f64>> = (0..count).map(of_one).collect();
             let one = json!({ "type": class, "interpolation": interpolation, "values": values });
@@ -397,8 +364,7 @@ fn usd_has_other_faces_from_frame_to_frame_and_primvars_that_fit_them() {
 
 #[test]
 fn a_liquid_that_is_gone_takes_its_mesh_along_and_one_that_appears_is_meshed() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let one = ball(5.0, SIDE, 0.1);
     mesh::write(&folder.join("one.ply"), &welded(&one.mesh)).unwrap();
     let (last_of_one, frames) = (3, 18);
@@ -407,7 +373,7 @@ fn a_liquid_that_is_gone_takes_its_mesh_along_and_one_that_appears_is_meshed() {
         // All particles end, and others with other ids begin a metre away.
         let (by, first_id) = if frame <= last_of_one { (DVec3::zeros(), 0) } else { (far(frame), 10_000) };
         let positions: Vec<DVec3> = one.positions.iter().map(|position| position + by).collect();
-        write_particles(&folder.join(format!("one.{frame:04}.bgeo")), &positions, first_id);
+        write_numbered(&folder.join(format!("one.{frame:04}.bgeo")), &positions, first_id);
     }
     works(folder, "surface -p one.%04d.bgeo -m one.ply --spacing 0.01 -o out");
     for number in 1..=frames {

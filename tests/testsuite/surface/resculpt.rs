@@ -4,13 +4,13 @@ use std::fs;
 use std::path::Path;
 
 use frazil::geometry::mesh::attributes::{MeshArray, Number, On};
-use frazil::geometry::points::{Attribute, Column, Values};
-use frazil::geometry::{DVec3, DetailedMesh, Points, TriMesh, Uvs, Vec3};
-use frazil::io::{mesh, particles};
+use frazil::geometry::{DVec3, DetailedMesh, TriMesh, Vec3};
+use frazil::io::mesh;
 
 use crate::common::character::{are_same, output};
+use crate::common::followed::{array, counted, frame, report, seamed, values, write_mesh, write_numbered};
 use crate::common::liquids::{ball, write_cache};
-use crate::program::{fails, kill_at, works};
+use crate::program::{Folder, fails, kill_at, works};
 
 /// Distance between particles (m), and frames of the shot.
 const SPACING: f64 = 0.01;
@@ -27,37 +27,17 @@ fn middle(frame: i32) -> DVec3 {
     DVec3::new(0.002, -0.001, 0.0) * f64::from(frame - 1)
 }
 
-fn array(name: &str, on: On, number: Number, values: Vec<f64>) -> MeshArray {
-    MeshArray { name: name.into(), on, number, values }
-}
-
-/// Numbers that count.
-fn counted(count: usize) -> Vec<f64> {
-    (0..count).map(|n| (n % 251) as f64).collect()
-}
-
-fn write_mesh(path: &Path, mesh: &DetailedMesh) {
-    let arrays: Vec<&MeshArray> = mesh.arrays.iter().collect();
-    let carried = mesh::Carried { uvs: mesh.uvs.as_ref(), arrays: &arrays, ..Default::default() };
-    mesh::write_carried(path, &mesh.mesh, &carried).unwrap();
-}
-
 /// The cache of a ball that travels, with a mesh that carries colours, masks and texture coordinates with seams.
 fn write_shot(folder: &Path) {
     let ball = ball(5.0, 10, 0.25);
     write_cache(folder, "ball", &ball, FRAMES);
     let (vertices, faces) = (ball.mesh.positions.len(), ball.mesh.triangles.len());
-    let uvs = Uvs {
-        coordinates: (0..3 * faces).map(|n| [n as f32 / 7.0, 1.0 / (1.0 + n as f32)]).collect(),
-        corners: Some((0..3 * faces as u32).collect()),
-        missing: 0,
-    };
     let arrays = vec![
         array("red", On::Vertices, Number::U8, counted(vertices)),
         array("mask", On::Vertices, Number::F64, counted(vertices)),
         array("part", On::Faces, Number::I32, counted(faces)),
     ];
-    write_mesh(&folder.join("ball.ply"), &DetailedMesh { mesh: ball.mesh, uvs: Some(uvs), arrays });
+    write_mesh(&folder.join("ball.ply"), &DetailedMesh { mesh: ball.mesh, uvs: Some(seamed(faces)), arrays });
     fs::create_dir(folder.join("sculpts")).unwrap();
 }
 
@@ -77,15 +57,6 @@ fn write_sculpt(folder: &Path, frame: i32, mesh: TriMesh, arrays: Vec<MeshArray>
     write_mesh(&path, &DetailedMesh { mesh, uvs: None, arrays });
 }
 
-/// A frame's mesh as it was written.
-fn frame(folder: &Path, out: &str, frame: i32) -> DetailedMesh {
-    mesh::read_detailed(&folder.join(format!("{out}/surface/surface.{frame:04}.ply"))).unwrap()
-}
-
-fn values<'a>(mesh: &'a DetailedMesh, name: &str) -> &'a [f64] {
-    &mesh.arrays.iter().find(|array| array.name == name).unwrap_or_else(|| panic!("no {name}")).values
-}
-
 /// How far a mesh reaches from the middle of the ball along z (spacings).
 fn reach(mesh: &TriMesh, frame: i32) -> f64 {
     let along = mesh.positions.iter().map(|position| (position.cast::<f64>() - middle(frame)).z / SPACING);
@@ -95,8 +66,7 @@ fn reach(mesh: &TriMesh, frame: i32) -> f64 {
 /// Whether the report of each frame says that an edited mesh took the place of the tracked one.
 fn resculpted(folder: &Path, out: &str) -> Vec<bool> {
     let of_frame = |frame: i32| {
-        let text = fs::read(folder.join(format!("{out}/report/surface.{frame:04}.json"))).unwrap();
-        let report: serde_json::Value = serde_json::from_slice(&text).unwrap();
+        let report = report(folder, out, frame);
         report["resculpted"].as_bool().unwrap_or_else(|| panic!("frame {frame}: {}", report["resculpted"]))
     };
     (1..=FRAMES).map(of_frame).collect()
@@ -109,8 +79,7 @@ fn is_no_record(name: &str) -> bool {
 
 #[test]
 fn a_mesh_that_was_sculpted_takes_the_position_of_the_tracked_one() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder);
     let sculpt = edited(3, BUMP);
     let (vertices, faces) = (sculpt.positions.len(), sculpt.triangles.len());
@@ -179,8 +148,7 @@ fn write_theirs(path: &Path, mesh: &TriMesh) {
 
 #[test]
 fn a_sculpt_of_another_format_or_in_another_space_is_the_same_mesh() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder);
     let sculpt = edited(3, BUMP);
     write_sculpt(folder, 3, sculpt.clone(), Vec::new());
@@ -191,10 +159,7 @@ fn a_sculpt_of_another_format_or_in_another_space_is_the_same_mesh() {
     for frame in 1..=FRAMES {
         let positions: Vec<DVec3> =
             ball.positions.iter().map(|position| theirs(position + middle(frame))).collect();
-        let mut points = Points::at(1.0, &positions).unwrap();
-        let ids = Values::Long(Column::Each((0..positions.len() as i64).collect()));
-        points.attributes.push(Attribute { name: "id".into(), values: ids });
-        particles::write(&folder.join(format!("up.{frame:04}.bgeo")), &points, false).unwrap();
+        write_numbered(&folder.join(format!("up.{frame:04}.bgeo")), &positions, 0);
     }
     works(folder, &format!("{SHOT} -o plain"));
     assert_eq!(resculpted(folder, "plain"), [false; FRAMES as usize]);
@@ -222,8 +187,7 @@ fn a_sculpt_of_another_format_or_in_another_space_is_the_same_mesh() {
 #[test]
 fn threads_kills_and_frames_made_again_give_the_same_bytes() {
     for shot in [SHOT, REBUILT] {
-        let folder = tempfile::tempdir().unwrap();
-        let folder = folder.path();
+        let folder = &Folder::empty();
         write_shot(folder);
         write_sculpt(folder, 3, edited(3, BUMP), Vec::new());
         write_sculpt(folder, 5, edited(5, 0.5 * BUMP), Vec::new());
@@ -246,8 +210,7 @@ fn threads_kills_and_frames_made_again_give_the_same_bytes() {
 
 #[test]
 fn a_sculpt_that_changes_comes_or_goes_is_noticed() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder);
     let shot = format!("{SHOT} {SCULPTS}");
     let again = |from: i32| {
@@ -277,8 +240,7 @@ fn a_sculpt_that_changes_comes_or_goes_is_noticed() {
 
 #[test]
 fn an_open_sculpt_is_closed_where_the_mesh_is_rebuilt() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder);
     let mut open = edited(3, BUMP);
     open.triangles.truncate(open.triangles.len() - 2);
@@ -298,8 +260,7 @@ fn an_open_sculpt_is_closed_where_the_mesh_is_rebuilt() {
 
 #[test]
 fn what_is_painted_to_last_on_a_sculpt_does_not_fade() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder);
     let shot = format!("{SHOT} {SCULPTS} --set surface.half_life=0.05");
     let sculpt = edited(3, BUMP);
@@ -318,8 +279,7 @@ fn what_is_painted_to_last_on_a_sculpt_does_not_fade() {
 
 #[test]
 fn what_is_no_sculpt_is_refused_with_the_key_or_the_file() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder);
     let shot = |pattern: &str, out: &str| format!("{SHOT} --set surface.resculpt={pattern} -o {out}");
     let refused = |pattern: &str, words: &[&str]| {

@@ -3,14 +3,15 @@
 use std::fs;
 use std::path::Path;
 
-use frazil::geometry::mesh::attributes::{MeshArray, Number, On};
+use frazil::geometry::mesh::attributes::{Number, On};
 use frazil::geometry::points::{Attribute, Column, Values};
-use frazil::geometry::{DVec3, DetailedMesh, Points, TriMesh, Uvs};
+use frazil::geometry::{DVec3, DetailedMesh, Points, TriMesh};
 use frazil::io::{mesh, particles};
 
 use crate::common::character::output;
+use crate::common::followed::{array, counted, frame, seamed, values, write_mesh};
 use crate::common::liquids::{Ball, ball, turned};
-use crate::program::{command, fails, kill_at, works};
+use crate::program::{Folder, command, fails, kill_at, works};
 
 /// Where a position of the first frame is in another: it turns and travels.
 fn motion(position: DVec3, frame: f64) -> DVec3 {
@@ -38,30 +39,13 @@ fn write_frame(path: &Path, ball: &Ball, frame: f64, attributes: &[&str]) {
 /// A ball's mesh with a seam in its texture coordinates, colours and masks of its vertices and faces.
 fn detailed(mesh: &TriMesh) -> DetailedMesh {
     let (vertices, faces) = (mesh.positions.len(), mesh.triangles.len());
-    let array = |name: &str, on, number, count: usize| MeshArray {
-        name: name.into(),
-        on,
-        number,
-        values: (0..count).map(|n| (n % 251) as f64).collect(),
-    };
-    let uvs = Uvs {
-        coordinates: (0..3 * faces).map(|n| [n as f32 / 7.0, 1.0 / (1.0 + n as f32)]).collect(),
-        corners: Some((0..3 * faces as u32).collect()),
-        missing: 0,
-    };
     let arrays = vec![
-        array("red", On::Vertices, Number::U8, vertices),
-        array("mask", On::Vertices, Number::F64, vertices),
-        array("part", On::Faces, Number::I32, faces),
-        array("wet", On::Corners, Number::F32, 3 * faces),
+        array("red", On::Vertices, Number::U8, counted(vertices)),
+        array("mask", On::Vertices, Number::F64, counted(vertices)),
+        array("part", On::Faces, Number::I32, counted(faces)),
+        array("wet", On::Corners, Number::F32, counted(3 * faces)),
     ];
-    DetailedMesh { mesh: mesh.clone(), uvs: Some(uvs), arrays }
-}
-
-fn write_mesh(path: &Path, mesh: &DetailedMesh) {
-    let arrays: Vec<&MeshArray> = mesh.arrays.iter().collect();
-    let carried = mesh::Carried { uvs: mesh.uvs.as_ref(), arrays: &arrays, ..Default::default() };
-    mesh::write_carried(path, &mesh.mesh, &carried).unwrap();
+    DetailedMesh { mesh: mesh.clone(), uvs: Some(seamed(faces)), arrays }
 }
 
 /// The cache of a ball that turns, of so many frames, with its mesh.
@@ -76,19 +60,9 @@ fn write_shot(folder: &Path, frames: i32) -> Ball {
 
 const SHOT: &str = "surface -p ball.%04d.bgeo -m ball.ply --spacing 0.01 --set surface.rebuild=false";
 
-/// A frame's mesh as it was written.
-fn frame(folder: &Path, out: &str, frame: i32) -> DetailedMesh {
-    mesh::read_detailed(&folder.join(format!("{out}/surface/surface.{frame:04}.ply"))).unwrap()
-}
-
-fn array<'a>(mesh: &'a DetailedMesh, name: &str) -> &'a [f64] {
-    &mesh.arrays.iter().find(|array| array.name == name).unwrap_or_else(|| panic!("no {name}")).values
-}
-
 #[test]
 fn the_mesh_moves_with_its_velocities_and_keeps_what_it_carries() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let ball = write_shot(folder, 6);
     let said = works(folder, &format!("{SHOT} -o out --report run.json"));
     assert!(!said.contains("estimated"), "{said}");
@@ -100,9 +74,9 @@ fn the_mesh_moves_with_its_velocities_and_keeps_what_it_carries() {
         for own in &before.arrays {
             assert!(now.arrays.contains(own), "{} at frame {number}", own.name);
         }
-        assert!(array(&now, "flagged").iter().all(|flag| *flag == 0.0));
+        assert!(values(&now, "flagged").iter().all(|flag| *flag == 0.0));
         let ahead = frame(folder, "out", (number + 1).min(6));
-        let speed = ["vx", "vy", "vz"].map(|name| array(&now, name));
+        let speed = ["vx", "vy", "vz"].map(|name| values(&now, name));
         for (vertex, position) in now.mesh.positions.iter().enumerate() {
             let truth = motion(ball.mesh.positions[vertex].cast(), f64::from(number - 1));
             assert!(
@@ -133,8 +107,7 @@ fn the_mesh_moves_with_its_velocities_and_keeps_what_it_carries() {
 
 #[test]
 fn threads_kills_and_another_order_of_frames_give_the_same_bytes() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder, 8);
     let shot = format!("{SHOT} --set output.surface=[\"ply\",\"usd\",\"obj\"]");
     works(folder, &format!("{shot} -o whole --threads 2"));
@@ -163,23 +136,21 @@ fn threads_kills_and_another_order_of_frames_give_the_same_bytes() {
 
 #[test]
 fn a_cache_that_grows_gives_the_last_frame_its_velocities() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let ball = write_shot(folder, 3);
     works(folder, &format!("{SHOT} -o out"));
     let before = frame(folder, "out", 3);
     write_frame(&folder.join("ball.0004.bgeo"), &ball, 3.0, &["v", "id"]);
     works(folder, &format!("{SHOT} -o out"));
     let after = frame(folder, "out", 3);
-    assert!(before.mesh == after.mesh && array(&before, "vx") != array(&after, "vx"));
+    assert!(before.mesh == after.mesh && values(&before, "vx") != values(&after, "vx"));
     works(folder, &format!("{SHOT} -o again"));
     assert!(output(&folder.join("out")) == output(&folder.join("again")));
 }
 
 #[test]
 fn a_sequence_may_start_later_and_run_faster_or_slower() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let ball = write_shot(folder, 5);
     let at = |out: &str, number: i32, time: f64| {
         let mesh = frame(folder, out, number).mesh;
@@ -200,8 +171,7 @@ fn a_sequence_may_start_later_and_run_faster_or_slower() {
 
 #[test]
 fn without_a_mesh_the_liquid_has_its_own_surface() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder, 3);
     works(folder, "surface -p ball.%04d.bgeo --spacing 0.01 -o out");
     let (first, last) = (frame(folder, "out", 1).mesh, frame(folder, "out", 3).mesh);
@@ -212,8 +182,7 @@ fn without_a_mesh_the_liquid_has_its_own_surface() {
 
 #[test]
 fn what_a_mesh_cannot_follow_is_refused_with_the_file() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let ball = write_shot(folder, 3);
     let refused = |arguments: &str, words: &[&str]| {
         fails(folder, &format!("{arguments} -o no"), 2, words);
@@ -262,8 +231,7 @@ fn what_a_mesh_cannot_follow_is_refused_with_the_file() {
 
 #[test]
 fn velocities_alone_are_enough_and_ids_alone_too() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let ball = write_shot(folder, 1);
     for (name, attributes) in [("fast", &["v"]), ("named", &["id"])] {
         for frame in 1..=4 {
@@ -287,8 +255,7 @@ fn velocities_alone_are_enough_and_ids_alone_too() {
 
 #[test]
 fn velocities_are_brought_into_the_shot_s_space_under_any_name() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let ball = write_shot(folder, 1);
     // Centimetres, Z up, all at 1 m/s upward; a number of another name comes first.
     for frame in 1..=2 {
@@ -313,15 +280,14 @@ fn velocities_are_brought_into_the_shot_s_space_under_any_name() {
     works(folder, &format!("surface -p up.%04d.bgeo -m up.ply --spacing 0.01 -o out {space}"));
     let now = frame(folder, "out", 1);
     for vertex in 0..now.mesh.positions.len() {
-        let speed = ["vx", "vy", "vz"].map(|name| array(&now, name)[vertex]);
+        let speed = ["vx", "vy", "vz"].map(|name| values(&now, name)[vertex]);
         assert!((speed[1] - 1.0).abs() < 0.01 && speed[0].abs() + speed[2].abs() < 0.01, "{speed:?}");
     }
 }
 
 #[test]
 fn what_lies_beyond_the_shot_does_not_keep_its_last_frame() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder, 4);
     fs::copy(folder.join("ball.0004.bgeo"), folder.join("ball.0007.bgeo")).unwrap();
     // A gap on the way to the frame behind the last one.
@@ -335,24 +301,23 @@ fn what_lies_beyond_the_shot_does_not_keep_its_last_frame() {
     // One frame of positions alone is a shot too.
     works(folder, "convert ball.0001.bgeo still.xyz");
     works(folder, "surface -p still.xyz -m ball.ply --spacing 0.01 -o still");
-    assert!(array(&frame(folder, "still", 1), "vx").iter().all(|speed| *speed == 0.0));
+    assert!(values(&frame(folder, "still", 1), "vx").iter().all(|speed| *speed == 0.0));
 }
 
 #[test]
 fn detail_may_be_painted_in_bytes_and_only_counts_where_it_fades() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let ball = write_shot(folder, 2);
     let paint = |number, value: f64| {
         let values = ball.mesh.positions.iter().map(|p| if p.x > 0.0 { value } else { 0.0 }).collect();
-        let arrays = vec![MeshArray { name: "detail".into(), on: On::Vertices, number, values }];
+        let arrays = vec![array("detail", On::Vertices, number, values)];
         write_mesh(&folder.join("ball.ply"), &DetailedMesh { mesh: ball.mesh.clone(), uvs: None, arrays });
     };
     paint(Number::U8, 255.0);
     works(folder, &format!("{SHOT} -o fades --set surface.half_life=0.01"));
     let now = frame(folder, "fades", 2);
     let first = frame(folder, "fades", 1);
-    let share = |vertex: usize| array(&now, "delta")[vertex] / array(&first, "delta")[vertex];
+    let share = |vertex: usize| values(&now, "delta")[vertex] / values(&first, "delta")[vertex];
     let on =
         |right: bool| (0..ball.mesh.positions.len()).find(|n| (ball.mesh.positions[*n].x > 0.0) == right);
     assert!(share(on(true).unwrap()) == 1.0 && share(on(false).unwrap()) < 0.1);
@@ -363,8 +328,7 @@ fn detail_may_be_painted_in_bytes_and_only_counts_where_it_fades() {
 
 #[test]
 fn check_reads_every_file_and_says_what_there_is() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder, 3);
     let scene = "[shot]\nframes = \"1-3\"\n[surface]\nparticles = \"ball.%04d.bgeo\"\nmesh = \"ball.ply\"\n";
     fs::write(folder.join("shot.toml"), scene).unwrap();

@@ -1,16 +1,15 @@
 //! `frazil surface` at drops of few particles (`surface.min_drop`), and at bubbles that the mesh lacks (`surface.match`).
 
-use std::fs;
 use std::path::Path;
 
 use frazil::geometry::check::topology::bodies;
-use frazil::geometry::points::{Attribute, Column, Values};
-use frazil::geometry::{DVec3, Points, TriMesh, Vec3};
-use frazil::io::{mesh, particles};
+use frazil::geometry::{DVec3, TriMesh, Vec3};
+use frazil::io::mesh;
 use frazil::surface::{Implicit, Isosurface};
 
+use crate::common::followed::{self, reported, write_numbered};
 use crate::common::liquids::context;
-use crate::program::works;
+use crate::program::{Folder, works};
 
 /// Distance between particles (m).
 const SPACING: f64 = 0.01;
@@ -27,23 +26,12 @@ fn lattice(low: DVec3, counts: [u32; 3]) -> impl Iterator<Item = DVec3> {
 /// Writes particles at positions (spacings), numbered from 0 on.
 fn write_particles(path: &Path, positions: &[DVec3]) {
     let positions: Vec<DVec3> = positions.iter().map(|position| position * SPACING).collect();
-    let mut points = Points::at(1.0, &positions).unwrap();
-    let ids = Values::Long(Column::Each((0..positions.len() as i64).collect()));
-    points.attributes.push(Attribute { name: "id".into(), values: ids });
-    particles::write(path, &points, false).unwrap();
+    write_numbered(path, &positions, 0);
 }
 
 /// A frame's mesh as it was written.
 fn frame(folder: &Path, out: &str, frame: i32) -> TriMesh {
-    mesh::read(&folder.join(format!("{out}/surface/surface.{frame:04}.ply"))).unwrap()
-}
-
-/// A number of a frame's report.
-#[track_caller]
-fn reported(folder: &Path, out: &str, frame: i32, key: &str) -> u64 {
-    let text = fs::read(folder.join(format!("{out}/report/surface.{frame:04}.json"))).unwrap();
-    let report: serde_json::Value = serde_json::from_slice(&text).unwrap();
-    report[key].as_u64().unwrap_or_else(|| panic!("{key} of frame {frame} is {}", report[key]))
+    followed::frame(folder, out, frame).mesh
 }
 
 /// Where the first particle of the drop is (spacings).
@@ -62,8 +50,7 @@ fn write_drop(folder: &Path) {
 
 #[test]
 fn a_drop_of_fewer_particles_than_min_drop_is_taken_away() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_drop(folder);
     let shot = "surface -p drop.%04d.bgeo --spacing 0.01";
     works(folder, &format!("{shot} -o all --set surface.min_drop=1"));
@@ -101,8 +88,7 @@ fn outer_surface(places: &[DVec3]) -> TriMesh {
 
 #[test]
 fn a_bubble_that_the_mesh_lacks_is_meshed_where_all_of_it_is_matched() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     let all = lattice(DVec3::repeat(-9.0), [19; 3]);
     let positions: Vec<DVec3> = all.filter(|position| (5.0..=8.5).contains(&position.norm())).collect();
     let outer = outer_surface(&positions);

@@ -4,16 +4,16 @@ use crate::common::skip::skipped;
 use std::fs;
 use std::path::Path;
 
-use frazil::geometry::mesh::attributes::{MeshArray, Number, On};
-use frazil::geometry::points::{Attribute, Column, Values};
-use frazil::geometry::{DVec3, DetailedMesh, Points, Vec3};
-use frazil::io::{mesh, particles};
+use frazil::geometry::mesh::attributes::{Number, On};
+use frazil::geometry::{DVec3, DetailedMesh, Vec3};
+use frazil::io::mesh;
 use serde_json::json;
 
 use crate::common::clients;
+use crate::common::followed::{self, counted, write_mesh, write_numbered};
 use crate::common::liquids::ball;
 use crate::common::usda::numbers;
-use crate::program::works;
+use crate::program::{Folder, works};
 
 /// Two frames of a ball of particles that travels, and a mesh around it with colours, masks and a triangle that is too far away to
 /// have a distance.
@@ -22,23 +22,15 @@ fn write_shot(folder: &Path) {
     for frame in 1..=2 {
         let by = DVec3::new(0.002, 0.0, 0.0) * f64::from(frame - 1);
         let positions: Vec<DVec3> = ball.positions.iter().map(|position| position + by).collect();
-        let mut points = Points::at(1.0, &positions).unwrap();
-        let ids = Values::Long(Column::Each((0..positions.len() as i64).collect()));
-        points.attributes.push(Attribute { name: "id".into(), values: ids });
-        particles::write(&folder.join(format!("ball.{frame:04}.bgeo")), &points, false).unwrap();
+        write_numbered(&folder.join(format!("ball.{frame:04}.bgeo")), &positions, 0);
     }
     let mut body = ball.mesh;
     let far = body.positions.len() as u32;
     body.positions.extend([0.3, 0.31, 0.32].map(|x| Vec3::new(x, x - 0.3, 0.01)));
     body.triangles.push([far, far + 1, far + 2]);
     let (vertices, faces) = (body.positions.len(), body.triangles.len());
-    let array = |name: &str, on, number, count: usize| MeshArray {
-        name: name.into(),
-        on,
-        number,
-        values: (0..count).map(|n| (n % 251) as f64).collect(),
-    };
-    let arrays = [
+    let array = |name: &str, on, number, count| followed::array(name, on, number, counted(count));
+    let arrays = vec![
         array("red", On::Vertices, Number::U8, vertices),
         array("green", On::Vertices, Number::U8, vertices),
         array("blue", On::Vertices, Number::U8, vertices),
@@ -46,9 +38,7 @@ fn write_shot(folder: &Path) {
         array("part.1", On::Faces, Number::I32, faces),
         array("wet", On::Corners, Number::F32, 3 * faces),
     ];
-    let arrays: Vec<&MeshArray> = arrays.iter().collect();
-    let carried = mesh::Carried { arrays: &arrays, ..Default::default() };
-    mesh::write_carried(&folder.join("ball.ply"), &body, &carried).unwrap();
+    write_mesh(&folder.join("ball.ply"), &DetailedMesh { mesh: body, uvs: None, arrays });
 }
 
 const SHOT: &str = "surface -p ball.%04d.bgeo -m ball.ply --spacing 0.01 --set surface.rebuild=false";
@@ -66,7 +56,7 @@ const PRIMVARS: [(&str, &str, &str); 7] = [
 
 /// The values of a primvar, from the .ply of the same frame: one for each, or three.
 fn values(made: &DetailedMesh, name: &str) -> Vec<Vec<f64>> {
-    let array = |name: &str| &made.arrays.iter().find(|array| array.name == name).unwrap().values;
+    let array = |name: &str| followed::values(made, name);
     let share = |value: &f64| f64::from(*value as f32 / 255.0);
     match name {
         "displayColor" => {
@@ -84,8 +74,7 @@ fn same(a: &[f32], b: &[f32]) -> bool {
 
 #[test]
 fn the_arrays_of_a_mesh_and_of_each_frame_are_primvars() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder);
     works(folder, &format!("{SHOT} -o out --set output.surface=[\"ply\",\"usd\"]"));
     let file = |name: &str| folder.join("out").join(name);
@@ -132,8 +121,7 @@ fn the_arrays_of_a_mesh_and_of_each_frame_are_primvars() {
 
 #[test]
 fn usd_has_the_attributes_that_are_asked_for() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
+    let folder = &Folder::empty();
     write_shot(folder);
     works(
         folder,

@@ -1,5 +1,6 @@
 //! The exact sweep against what can be known otherwise: formulas, sampled poses, and what must not matter.
 
+use crate::common::liquids::context;
 use crate::common::shapes;
 use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::motion::{Key, Keys, Morph, Motion, Rigid};
@@ -9,10 +10,6 @@ use frazil::{Context, Pool};
 use nalgebra::Rotation3;
 
 const CELL: f64 = 0.01;
-
-fn context() -> Context {
-    Context::new(Pool::new(2).unwrap())
-}
 
 fn body(motion: impl Motion + 'static) -> Body {
     Body::new(Box::new(motion), 0.0).unwrap()
@@ -49,7 +46,7 @@ fn each_voxel(grid: &FloatGrid, low: DVec3, high: DVec3, mut see: impl FnMut(DVe
 #[test]
 fn a_slid_box_has_the_distances_of_a_longer_box() {
     let grid = sweep(
-        &context(),
+        &context(2),
         body(Rigid::new(shapes::cuboid([0.2, 0.1, 0.15]), keys(DVec3::x() * 0.313, DVec3::zeros()))),
     );
     // From the first box's corner to the last's.
@@ -69,7 +66,7 @@ fn a_turning_cube_is_the_union_of_its_poses() {
     let turn = DVec3::new(0.25, 0.5, -0.3);
     let by = DVec3::new(0.05, 0.12, -0.03);
     let motion = Rigid::new(centred(0.2), keys(by, turn));
-    let grid = sweep(&context(), body(motion));
+    let grid = sweep(&context(2), body(motion));
     let poses: Vec<(Rotation3<f64>, DVec3)> =
         (0..=400).map(|i| keys(by, turn).at(f64::from(i) / 400.0)).collect();
     let (mut inside, mut outside) = (0, 0);
@@ -100,7 +97,7 @@ fn a_twisting_bar_is_the_union_of_its_poses() {
         Rotation3::from_axis_angle(&Vec3::z_axis(), angle) * (p - middle) + middle
     });
     let morph = Morph::new(bar.clone(), twisted.collect()).unwrap();
-    let ctx = context();
+    let ctx = context(2);
     let mut posed = Vec::new();
     let mut union: Option<FloatGrid> = None;
     for i in 0..=40 {
@@ -134,7 +131,7 @@ fn sheets_inside_are_not_seen() {
     other.positions.iter_mut().for_each(|p| p.x += 0.15);
     mesh.append(&other);
     let turn = DVec3::new(0.0, 0.1, 0.0);
-    let grid = sweep(&context(), body(Rigid::new(mesh, keys(DVec3::x() * 0.05, turn))));
+    let grid = sweep(&context(2), body(Rigid::new(mesh, keys(DVec3::x() * 0.05, turn))));
     // On the faces of each box that lie within the other, and on every later pose of them.
     for x in [0.0, 0.02, 0.1, 0.13, 0.15, 0.17, 0.2] {
         let value = grid.value([(x / CELL) as i32, 0, 0]);
@@ -151,7 +148,7 @@ fn volume(ctx: &Context, mesh: TriMesh) -> f64 {
 
 #[test]
 fn duplicates_soup_and_reversed_faces_sweep_the_same() {
-    let ctx = context();
+    let ctx = context(2);
     let mesh = shapes::blob(0.3, 8);
     let whole = volume(&ctx, mesh.clone());
     let mut twice = mesh.clone();
@@ -198,7 +195,7 @@ fn centred(edge: f32) -> TriMesh {
 
 #[test]
 fn a_box_whose_faces_lie_on_voxels_is_one_piece() {
-    let ctx = context();
+    let ctx = context(2);
     let mut mesh = shapes::cuboid([0.6, 0.2, 0.4]);
     let (low, _) = mesh.bounds().unwrap();
     mesh.positions.iter_mut().for_each(|p| *p -= low);

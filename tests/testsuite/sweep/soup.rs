@@ -8,14 +8,10 @@ use frazil::mesh_repair::repair;
 use frazil::motion::{Key, Keys, Morph, Motion, Placed, Rigid, Space, Up};
 use frazil::snow::base_layer::initial::{self, Cover, Ground};
 use frazil::sweep::{self, Body, Settings};
-use frazil::{Context, Pool};
 
 use crate::common::bodies::Dice;
+use crate::common::liquids::context;
 use crate::common::soups::{Solid, solids, volume_inside as volume};
-
-fn context() -> Context {
-    Context::new(Pool::new(2).unwrap())
-}
 
 #[track_caller]
 fn near(found: f64, expected: f64, what: &str) {
@@ -33,7 +29,7 @@ fn shared(solid: &Solid) -> TriMesh {
 
 #[test]
 fn soup_has_the_volume_of_its_solid() {
-    let (ctx, mut dice) = (context(), Dice(21));
+    let (ctx, mut dice) = (context(2), Dice(21));
     for (size, far) in [(1.0, 0.0), (4.0, 1e4), (40.0, 1e5)] {
         for solid in solids(&mut dice) {
             let soup = solid.soup(size, dice.direction() * far, 4, &mut dice);
@@ -71,7 +67,7 @@ fn corners_are_those_of_the_file_however_a_body_is_scaled_turned_and_moved() {
 
 #[test]
 fn soup_that_shakes_by_rounding_as_it_moves_stays_whole() {
-    let (ctx, mut dice) = (context(), Dice(23));
+    let (ctx, mut dice) = (context(2), Dice(23));
     let solid = solids(&mut dice).swap_remove(0);
     let at = DVec3::new(3.0, 1.0, 2.0);
     let [first, last] = [at, at + DVec3::new(0.5, 0.0, 0.0)].map(|at| solid.soup(1.0, at, 4, &mut dice));
@@ -107,7 +103,7 @@ fn a_shape_is_shared_only_where_its_corners_are_the_same() {
 
 #[test]
 fn snow_lies_on_soup_as_on_its_solid() {
-    let (ctx, mut dice) = (context(), Dice(25));
+    let (ctx, mut dice) = (context(2), Dice(25));
     for solid in solids(&mut dice) {
         let soup = solid.soup(1.0, DVec3::zeros(), 4, &mut dice);
         let on_ground = |mesh: TriMesh| {

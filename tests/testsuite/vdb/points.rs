@@ -5,16 +5,14 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
+use crate::common::liquids::context;
+use crate::program::Folder;
+use frazil::Error;
 use frazil::geometry::DVec3;
 use frazil::geometry::points::{Column, Points, Values};
 use frazil::vdb::file::{Compression, WriteOptions};
 use frazil::vdb::reading::guard::Guard;
 use frazil::vdb::{FloatGrid, MetaValue, file, points};
-use frazil::{Context, Error, Pool};
-
-fn context(threads: usize) -> Context {
-    Context::new(Pool::new(threads).unwrap())
-}
 
 fn guard() -> Guard {
     let program = env!("CARGO_BIN_EXE_frazil").into();
@@ -69,8 +67,8 @@ fn bits(points: &Points) -> String {
 #[test]
 fn a_file_gives_back_every_bit_near_the_origin_and_far_from_it() {
     let ctx = context(2);
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("grains.vdb");
+    let folder = Folder::empty();
+    let path = folder.join("grains.vdb");
     let given = cloud(20_000);
     for compression in [Compression::None, Compression::Zip, Compression::Blosc] {
         let metadata = vec![("frazil:frame".to_string(), MetaValue::Int(12))];
@@ -101,8 +99,8 @@ fn the_bytes_do_not_depend_on_threads() {
 #[test]
 fn points_of_a_voxel_keep_their_order_and_equal_positions_their_values() {
     let ctx = context(2);
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("heap.vdb");
+    let folder = Folder::empty();
+    let path = folder.join("heap.vdb");
     let mut heap = Points::at(1.0, &[DVec3::new(0.1, 0.2, 0.3); 1000]).unwrap();
     heap.set("id", Values::Long(Column::Each((0..1000).rev().collect())));
     points::write(&ctx, &path, "heap", &heap, &WriteOptions::default()).unwrap();
@@ -111,8 +109,8 @@ fn points_of_a_voxel_keep_their_order_and_equal_positions_their_values() {
 
 #[test]
 fn no_points_are_a_file_too() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("none.vdb");
+    let folder = Folder::empty();
+    let path = folder.join("none.vdb");
     let none = Points { voxel_size: 0.5, ..Points::default() };
     points::write(&context(1), &path, "grains", &none, &WriteOptions::default()).unwrap();
     assert_eq!(points::read_own(&path, None).unwrap(), none);
@@ -122,8 +120,8 @@ fn no_points_are_a_file_too() {
 #[test]
 fn wrong_points_and_other_grids_are_refused_in_a_sentence() {
     let ctx = context(1);
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("a.vdb");
+    let folder = Folder::empty();
+    let path = folder.join("a.vdb");
     let mut wrong = cloud(9);
     wrong.offsets[4][1] = f32::NAN;
     let error = points::to_bytes(&ctx, "grains", &wrong, &WriteOptions::default()).unwrap_err();
@@ -196,12 +194,12 @@ fn survives(folder: &Path, bytes: &[u8], count: u64) -> usize {
 #[test]
 fn damaged_points_are_a_sentence() {
     let ctx = context(2);
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let count = std::env::var("FRAZIL_FUZZ").ok().and_then(|text| text.parse().ok()).unwrap_or(200);
     for compression in [Compression::Blosc, Compression::None] {
         let options = WriteOptions { compression, ..WriteOptions::default() };
         let bytes = points::to_bytes(&ctx, "grains", &cloud(600), &options).unwrap();
-        let read = survives(folder.path(), &bytes, count / 2);
+        let read = survives(&folder, &bytes, count / 2);
         assert!(read < count as usize / 2, "no damage was seen");
     }
 }

@@ -1,18 +1,16 @@
 //! OpenVDB's tools as we wrap them: the same bytes from any number of threads, the textbook's volumes, and
 //! whole grids after a cancel or from a damaged file.
 
+use crate::common::liquids::context;
 use crate::common::shapes::{cuboid, sphere};
 use crate::common::tools;
+use crate::program::Folder;
+use frazil::Context;
 use frazil::geometry::TriMesh;
 use frazil::numeric::blocks::{Block, BlockEdit};
 use frazil::vdb::file::{self, WriteOptions, to_bytes};
 use frazil::vdb::level_set::{self, Scheme};
 use frazil::vdb::{FloatGrid, MetaValue};
-use frazil::{Context, Pool};
-
-fn context(threads: usize) -> Context {
-    Context::new(Pool::new(threads).unwrap())
-}
 
 fn at(mut mesh: TriMesh, [x, y, z]: [f32; 3]) -> TriMesh {
     mesh.positions.iter_mut().for_each(|p| *p += frazil::geometry::Vec3::new(x, y, z));
@@ -154,12 +152,12 @@ fn a_cancelled_tool_leaves_its_grid_as_it_was() {
 #[test]
 fn a_file_cut_at_any_of_20_positions_is_refused_in_a_sentence() {
     let ctx = context(1);
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::empty();
     let mut grid = level_set::from_mesh(&ctx, &sphere(0.2, 24), 0.02, 3.0).unwrap();
     grid.set_name("ball").unwrap();
     grid.set_metadata("who", MetaValue::Text("nobody".into())).unwrap();
     let bytes = to_bytes(&[&grid], &WriteOptions::default()).unwrap();
-    let path = folder.path().join("cut.vdb");
+    let path = folder.join("cut.vdb");
     for part in 0..20 {
         std::fs::write(&path, &bytes[..bytes.len() * part / 20]).unwrap();
         let error =
@@ -173,8 +171,8 @@ fn a_file_cut_at_any_of_20_positions_is_refused_in_a_sentence() {
 #[test]
 fn values_that_are_not_finite_are_refused_with_the_grid() {
     let ctx = context(2);
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("nan.vdb");
+    let folder = Folder::empty();
+    let path = folder.join("nan.vdb");
     let mut grid = level_set::from_mesh(&ctx, &sphere(0.2, 6), 0.05, 3.0).unwrap();
     grid.leaves_mut().unwrap()[1].values[77] = f32::NAN;
     file::write(&path, &[&grid], &WriteOptions::default()).unwrap();

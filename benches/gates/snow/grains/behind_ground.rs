@@ -1,17 +1,12 @@
 //! Gate of grains behind the ground: hills, valleys and slopes that a ball sweeps, and plates that press snow on a plane.
 
 use crate::common::hills::{params, squeeze, terrains};
-use crate::harness::Harness;
 use crate::scenes::context;
 
 /// Seeds of each scene, which have different compression too.
 const SEEDS: u64 = 3;
 
-pub fn run(h: &mut Harness) {
-    let name = "snow.grains.behind_ground";
-    if !h.wants(name) {
-        return;
-    }
+pub fn measure() -> (f64, String) {
     let ctx = context(2);
     let (mut behind, mut born) = (0, 0);
     for terrain in terrains() {
@@ -32,5 +27,5 @@ pub fn run(h: &mut Harness) {
         }
         (behind, born) = (behind + out.behind + out.low, born + out.born);
     }
-    h.gate(name, behind as f64, &format!("{born} births, in every frame"));
+    (behind as f64, format!("{born} births, in every frame"))
 }

@@ -3,7 +3,6 @@
 use frazil::Context;
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Key, Keys, Rigid};
-use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::base_layer::{BaseLayer, Params as BaseParams};
 use frazil::snow::grains::{Base, Grains, Object, PACKING, Params, StepReport, Surroundings};
 use frazil::sweep::Body;
@@ -11,8 +10,8 @@ use frazil::vdb::FloatGrid;
 
 use crate::common::shapes::sphere;
 use crate::harness::Harness;
-use crate::scenes::context;
-use crate::snow::grains::FRAME;
+use crate::scenes::{context, layer};
+use crate::snow::grains::{FRAME, ON_A_FLOOR};
 
 /// Edge of a cell of the layer (m).
 const CELL: f64 = 0.01;
@@ -20,16 +19,14 @@ const CELL: f64 = 0.01;
 const LOWEST: f64 = -0.1;
 
 pub fn run(h: &mut Harness) {
-    ledger(h);
-    spread(h);
-    speed(h);
+    h.measure("snow.grains.ledger", ledger);
+    h.measure("snow.grains.birth_spread", spread);
+    h.measure("snow.grains.birth_speed", speed);
 }
 
 /// Snow 0.15 m deep.
 fn snow(ctx: &Context) -> BaseLayer {
-    let ground = Ground::Plane { height: 0.0, area: [-0.3, -0.25, 0.3, 0.25] };
-    let snow = layer(ctx, &ground, &[], &Cover::Depth(0.15), CELL, 3.0).expect("snow");
-    BaseLayer::new(ctx, snow, BaseParams::for_cell(CELL)).expect("a layer")
+    layer(ctx, 0.0, [-0.3, -0.25, 0.3, 0.25], 0.15, CELL, BaseParams::for_cell(CELL))
 }
 
 /// A body that passes positions (m) at times (s).
@@ -58,10 +55,9 @@ fn step(
     let around = Surroundings {
         base: Base::Changed(base.surface(), base.before()),
         objects: &[Object::new(body, 0.3)],
-        statics: &[],
-        ground: &[],
         floor: None,
         lowest: LOWEST,
+        ..ON_A_FLOOR
     };
     (lost.removed_volume, grains.step(ctx, &around, [from, to], frame).expect("a step"))
 }
@@ -83,11 +79,7 @@ pub fn ploughed_snow(ctx: &Context, frames: i32) -> (BaseLayer, Grains) {
 }
 
 /// The balance of each frame: grains paid for by snow, owed before, owed after and born.
-fn ledger(h: &mut Harness) {
-    let name = "snow.grains.ledger";
-    if !h.wants(name) {
-        return;
-    }
+fn ledger() -> (f64, &'static str) {
     let ctx = context(2);
     let params = Params { compression: 0.5, ..Params::for_cell(CELL) };
     let paid = |volume: f64| {
@@ -118,15 +110,11 @@ fn ledger(h: &mut Harness) {
     assert!(dropped > 0, "the experiment drops none");
     // The rest is rounding of sums.
     let worst = if worst < 1.0e-6 { 0.0 } else { worst };
-    h.gate(name, worst + off as f64, "");
+    (worst + off as f64, "")
 }
 
 /// Count of grains of the same print, made in few and in many frames.
-fn spread(h: &mut Harness) {
-    let name = "snow.grains.birth_spread";
-    if !h.wants(name) {
-        return;
-    }
+fn spread() -> (f64, &'static str) {
     let ctx = context(2);
     let params = Params { compression: 0.5, ..Params::for_cell(CELL) };
     let body =
@@ -146,28 +134,17 @@ fn spread(h: &mut Harness) {
     });
     let most = counts.iter().copied().fold(f64::MIN, f64::max);
     let least = counts.iter().copied().fold(f64::MAX, f64::min);
-    h.gate(name, (most - least) / (counts.iter().sum::<f64>() / 3.0) * 100.0, "");
+    ((most - least) / (counts.iter().sum::<f64>() / 3.0) * 100.0, "")
 }
 
 /// Speed of grains a frame after birth, pushed only by each other and the snow around them.
-fn speed(h: &mut Harness) {
-    let name = "snow.grains.birth_speed";
-    if !h.wants(name) {
-        return;
-    }
+fn speed() -> (f64, String) {
     let ctx = context(2);
     let params = Params { compression: 0.0, gravity: 0.0, ..Params::for_cell(CELL) };
     let (mut base, body) = (snow(&ctx), plough());
     let whole = base.surface().deep_copy().expect("a copy");
     let speed = |layers: [&FloatGrid; 2], frame: i32| {
-        let around = Surroundings {
-            base: Base::Whole(layers),
-            objects: &[],
-            statics: &[],
-            ground: &[],
-            floor: None,
-            lowest: LOWEST,
-        };
+        let around = Surroundings { base: Base::Whole(layers), floor: None, lowest: LOWEST, ..ON_A_FLOOR };
         let mut grains = Grains::new(params).expect("grains");
         let report = grains.step(&ctx, &around, [0.0, FRAME], frame).expect("a step");
         if report.fastest > 0.0 {
@@ -185,5 +162,5 @@ fn speed(h: &mut Harness) {
     }
     // All removed snow at once.
     add(speed([&whole, base.surface()], 99));
-    h.gate(name, fastest, &format!("{born} births"));
+    (fastest, format!("{born} births"))
 }

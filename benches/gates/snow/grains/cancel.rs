@@ -8,7 +8,7 @@ use frazil::capi::snow::grains_points::*;
 use frazil::capi::{frz_status, frz_view};
 
 use crate::capi::cancel_latency::{Steps, measure};
-use crate::capi::host::{Threads, view, works, written};
+use crate::capi::host::{Threads, usual, view, works, written};
 use crate::harness::Harness;
 use crate::snow::grains::{FRAME, Random};
 
@@ -26,19 +26,17 @@ struct Host {
 impl Host {
     fn new(random: &mut Random) -> Self {
         let mut host = Self { threads: Threads::new(2), grains: null_mut() };
-        let mut params = std::mem::MaybeUninit::<frz_grains_params>::uninit();
+        let mut params = usual(frz_grains_params_init);
+        (params.radius, params.sub_steps) = (0.0025, STEP.1);
+        params.flags = FRZ_GRAINS_FLOOR | FRZ_GRAINS_RESTLESS;
         let apart = 1.1 * 2.0 * 0.0025;
         let sites = (0..SIDES[0]).flat_map(|x| (0..SIDES[1]).map(move |y| [x, y]));
         let sites = sites.flat_map(|[x, y]| (0..SIDES[2]).map(move |z| [x, y, z]));
         let mut off = |at: u32| ((f64::from(at) + 0.5 + 0.05 * random.next()) * apart) as f32;
         let positions: Vec<[f32; 3]> = sites.map(|site| site.map(&mut off)).collect();
         let none = frz_view { data: null(), count: 0, stride: 0 };
-        // SAFETY: the pointers are valid, and the parameters are filled before they are read.
+        // SAFETY: the pointers are valid.
         unsafe {
-            works(frz_grains_params_init(params.as_mut_ptr(), size_of::<frz_grains_params>()));
-            let mut params = params.assume_init();
-            (params.radius, params.sub_steps) = (0.0025, STEP.1);
-            params.flags = FRZ_GRAINS_FLOOR | FRZ_GRAINS_RESTLESS;
             works(frz_grains_create(host.threads.ctx, &params, null(), 0, &mut host.grains));
             works(frz_grains_emit(host.threads.ctx, host.grains, view(&positions), none, 0, null_mut()));
         }

@@ -3,12 +3,12 @@
 
 use std::fmt::Write;
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 use frazil::geometry::DVec3;
 use frazil::io::particles::ply;
 
 use crate::harness::Harness;
+use crate::process::{frazil, works};
 use crate::snow::grains::column_collapse::{self, D};
 
 /// Approximate count of grains of a column.
@@ -41,9 +41,7 @@ fn collapsed(folder: &Path, positions: &[DVec3]) -> Vec<DVec3> {
     );
     std::fs::write(folder.join("column.ply"), cloud).expect("points");
     std::fs::write(folder.join("scene.toml"), scene).expect("a scene");
-    let mut run = Command::new(env!("CARGO_BIN_EXE_frazil"));
-    let run = run.arg("snow").arg(folder.join("scene.toml")).arg("-o").arg(folder.join("out"));
-    assert!(run.args(["-q", "--threads", "2"]).stderr(Stdio::null()).status().expect("frazil").success());
+    works(frazil("snow scene.toml -o out -q --threads 2".split(' ')).current_dir(folder));
     let last = folder.join(format!("out/grains/grains.{FRAMES:04}.ply"));
     let end = ply::read(&last).expect("grains").positions;
     assert_eq!(end.len(), positions.len(), "none is lost");

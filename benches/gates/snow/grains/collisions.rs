@@ -5,15 +5,16 @@ use std::path::Path;
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Key, Keys, Motion, Rigid};
 use frazil::snow::grains::heap::Shell;
-use frazil::snow::grains::{Base, Grains, Object, Params, Surroundings};
+use frazil::snow::grains::{Grains, Object, Params, Surroundings};
 use frazil::sweep::Body;
 use rayon::prelude::*;
 
 use crate::common::shapes::cuboid;
 use crate::harness::Harness;
-use crate::scenes::context;
-use crate::snow::grains::FRAME;
+use crate::process::works;
+use crate::scenes::{MAN, context, wanted_data};
 use crate::snow::grains::passes::{pass, walk};
+use crate::snow::grains::{FRAME, ON_A_FLOOR};
 
 /// Diameter of the grains (m).
 const D: f64 = 0.005;
@@ -70,14 +71,7 @@ fn through(h: &mut Harness, name: &str, motion: Box<dyn Motion>, frames: i32) {
     for frame in 1..=12 + frames {
         let objects = [Object::new(&body, 0.3)];
         let objects = if frame <= 12 { &objects[..0] } else { &objects[..] };
-        let around = Surroundings {
-            base: Base::Missing,
-            objects,
-            statics: &[],
-            ground: &[],
-            floor: Some(0.0),
-            lowest: -1.0,
-        };
+        let around = Surroundings { objects, ..ON_A_FLOOR };
         let times = [frame - 13, frame - 12].map(|frame| f64::from(frame.max(0)) * FRAME);
         let times = if frame <= 12 { [0.0, FRAME] } else { times };
         let report = grains.step(&ctx, &around, times, frame).expect("a step");
@@ -177,20 +171,15 @@ fn sheet(h: &mut Harness) {
 
 /// A character that walks through snow: its soles press grains against the base.
 fn walker(h: &mut Harness) {
-    if !h.wants("snow.grains.deep_walker") {
-        return;
-    }
-    let Some(man) = crate::common::character::data("character/CesiumMan.glb") else {
-        h.skipped("snow.grains.deep_walker", "no data");
-        return;
-    };
+    let name = "snow.grains.deep_walker";
+    let Some(man) = wanted_data(h, &[name], MAN) else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let scene = walk(folder.path(), &man, 48, 0.012, "");
     let mut text = std::fs::read_to_string(&scene).expect("a scene");
     text.insert_str(0, "output = { objects = [\"ply\"] }\n");
     std::fs::write(&scene, text).expect("a scene");
     let out = folder.path().join("out");
-    assert!(pass(&scene, &out, 2).status().expect("frazil").success());
+    works(&mut pass(&scene, &out, 2));
     let (mut in_object, mut in_base, mut trapped, mut count) = (0, 0, 0, 0);
     for frame in (6..=48).step_by(6) {
         let [object, base, marked, all] = walker_frame(&out, frame);
@@ -203,7 +192,7 @@ fn walker(h: &mut Harness) {
     let note = format!(
         "{in_object} in the character, {in_base} in the base; {trapped} trapped of {count}, 8 frames"
     );
-    h.gate("snow.grains.deep_walker", (in_object + in_base) as f64, &note);
+    h.gate(name, (in_object + in_base) as f64, &note);
 }
 
 /// Counts of grains of a frame: not trapped but in the character, or in the base; trapped; all.

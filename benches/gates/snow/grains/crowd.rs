@@ -6,15 +6,11 @@ use frazil::io::mesh;
 use frazil::vdb::points;
 
 use crate::common::shapes::cuboid;
-use crate::harness::Harness;
+use crate::process::works;
 use crate::snow::grains::passes::pass;
 
 /// Largest count of grains in a cube of two diameters, in any frame: a random packing fits ten.
-pub fn run(h: &mut Harness) {
-    let name = "snow.grains.crowd";
-    if !h.wants(name) {
-        return;
-    }
+pub fn measure() -> (f64, String) {
     let folder = tempfile::tempdir().expect("a folder");
     let object = folder.path().join("box.obj");
     mesh::write(&object, &cuboid([0.06, 0.1, 0.12])).expect("a mesh");
@@ -27,7 +23,7 @@ pub fn run(h: &mut Harness) {
     );
     std::fs::write(&scene, text).expect("a scene");
     let out = folder.path().join("out");
-    assert!(pass(&scene, &out, 2).status().expect("frazil").success());
+    works(&mut pass(&scene, &out, 2));
     let (mut most, mut grains) = (0, 0);
     for frame in 2..=12 {
         let points = points::read(&out.join(format!("grains/grains.{frame:04}.vdb")), None).expect("points");
@@ -40,5 +36,5 @@ pub fn run(h: &mut Harness) {
         }
         most = most.max(counts.into_values().max().unwrap_or(0));
     }
-    h.gate(name, f64::from(most), &format!("at 1.1 m/s, {grains} grains in the end"));
+    (f64::from(most), format!("at 1.1 m/s, {grains} grains in the end"))
 }

@@ -6,13 +6,12 @@ use std::path::Path;
 use frazil::geometry::DVec3;
 use frazil::vdb::{file, points};
 
-use crate::common::character::data;
 use crate::harness::Harness;
-use crate::scenes::context;
+use crate::process::{json, works};
+use crate::scenes::{MAN, context, wanted_data};
 use crate::snow::grains::passes::{pass, walk};
 use crate::snow::grains::rest::moving;
 
-const NAME: &str = "snow.grains.distance_rule";
 /// Frames and cell (m) of the walk: coarse, to be quick.
 const WALK: (i32, f64) = (48, 0.012);
 /// Frames whose time counts: those in which the walker has left snow behind.
@@ -27,24 +26,21 @@ const TOP: f64 = 0.6;
 type Tops = BTreeMap<[i32; 2], f64>;
 
 pub fn run(h: &mut Harness) {
-    if !h.wants(NAME) {
-        return;
-    }
-    let Some(man) = data("character/CesiumMan.glb") else {
-        h.skipped(NAME, "no data");
-        return;
-    };
+    let name = "snow.grains.distance_rule";
+    let Some(man) = wanted_data(h, &[name], MAN) else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let (frames, cell) = WALK;
     let scene = walk(folder.path(), &man, frames, cell, "");
     let out = folder.path().join("out");
-    assert!(pass(&scene, &out, 2).args(["--stage", "base"]).status().expect("frazil").success());
+    works(pass(&scene, &out, 2).args(["--stage", "base"]));
     let square = 4.0 * cell / 3.0;
     // The same base for all; the top of the grains, the seconds that they took, and the share that rests.
     let grains = |seed: i32, rule: &[&str]| {
         let mut run = pass(&scene, &out, 2);
-        run.args(["--stage", "grains", "--from", "1", "--set", &format!("grains.seed={seed}")]).args(rule);
-        assert!(run.status().expect("frazil").success());
+        works(
+            run.args(["--stage", "grains", "--from", "1", "--set", &format!("grains.seed={seed}")])
+                .args(rule),
+        );
         let reports = || LATE.map(|frame| out.join(format!("report/grains.{frame:04}.json")));
         let seconds: f64 = reports().map(|report| moving(&report)).sum();
         let shares = reports().map(|report| resting(&report)).sum::<f64>() / LATE.count() as f64;
@@ -73,13 +69,12 @@ pub fn run(h: &mut Harness) {
         100.0 * mean(&ruled, 1),
         100.0 * mean(&all, 1),
     );
-    h.gate(NAME, changed / by_seed, &note);
+    h.gate(name, changed / by_seed, &note);
 }
 
 /// Share of the grains that rest, of a report.
 fn resting(report: &Path) -> f64 {
-    let text = std::fs::read(report).expect("a report");
-    let report: serde_json::Value = serde_json::from_slice(&text).expect("a report");
+    let report = json(report);
     let count = |name: &str| report[name].as_f64().expect("a number");
     count("resting") / count("grains")
 }

@@ -7,15 +7,12 @@ use crate::harness::Harness;
 use crate::snow::grains::{Experiment, FRAME};
 
 pub fn run(h: &mut Harness) {
-    alone(h);
-    heap_in_the_air(h);
+    h.measure_all(["snow.grains.fall_speed", "snow.grains.fall_way", "snow.grains.air"], alone);
+    h.measure_all(["snow.grains.free_momentum", "snow.grains.free_energy"], heap_in_the_air);
 }
 
 /// A grain that nothing touches.
-fn alone(h: &mut Harness) {
-    if !["fall_speed", "fall_way", "air"].iter().any(|name| h.wants(&format!("snow.grains.{name}"))) {
-        return;
-    }
+fn alone() -> [(f64, &'static str); 3] {
     let one_grain = |air: f64, gravity: f64, speed: f32, sub_steps: usize| {
         let mut one = Experiment::new(2, 0.005, 0.2, 1);
         one.colliders = Colliders::default();
@@ -27,21 +24,16 @@ fn alone(h: &mut Harness) {
     let sub_steps = Experiment::new(2, 0.005, 0.2, 1).division.sub_steps;
     let (position, velocity) = one_grain(1.0, -9.81, 0.0, sub_steps);
     let dt = FRAME / sub_steps as f64;
-    h.gate("snow.grains.fall_speed", (f64::from(velocity[1]) / -9.81 - 1.0).abs(), "");
-    h.gate("snow.grains.fall_way", ((45.6 - position.y) / (0.5 * 9.81 * (1.0 + dt)) - 1.0).abs(), "");
     let kept = |sub_steps: usize| f64::from(one_grain(0.5, 0.0, 1.0, sub_steps).1[0]);
-    h.gate(
-        "snow.grains.air",
-        [1, 40].map(|n| (kept(n) / 0.5 - 1.0).abs()).into_iter().fold(0.0, f64::max),
-        "",
-    );
+    [
+        ((f64::from(velocity[1]) / -9.81 - 1.0).abs(), ""),
+        (((45.6 - position.y) / (0.5 * 9.81 * (1.0 + dt)) - 1.0).abs(), ""),
+        ([1, 40].map(|n| (kept(n) / 0.5 - 1.0).abs()).into_iter().fold(0.0, f64::max), ""),
+    ]
 }
 
 /// A heap that nothing holds: grains that fly into each other.
-fn heap_in_the_air(h: &mut Harness) {
-    if !h.wants("snow.grains.free_momentum") && !h.wants("snow.grains.free_energy") {
-        return;
-    }
+fn heap_in_the_air() -> [(f64, &'static str); 2] {
     let mut heap = Experiment::new(2, 0.005, 0.3, 3);
     heap.colliders = Colliders::default();
     (heap.params.air, heap.params.gravity) = (1.0, 0.0);
@@ -75,6 +67,5 @@ fn heap_in_the_air(h: &mut Harness) {
         lost = lost.max((0..3).map(|axis| (now[axis] - start[axis]).powi(2)).sum::<f64>().sqrt() / size);
     }
     println!("# energy at the end: {:.3} of that at the start", energy / first);
-    h.gate("snow.grains.free_momentum", lost, "");
-    h.gate("snow.grains.free_energy", rise, "");
+    [(lost, ""), (rise, "")]
 }

@@ -6,31 +6,28 @@ use frazil::motion::Motion;
 use frazil::snow::grain_cohesion::of_wall;
 use frazil::snow::grain_friction::of_repose;
 use frazil::snow::grains::heap::{Colliders, Floor, Pose, Shell};
-use frazil::snow::grains::{Base, Grains, Object, Params, Surroundings};
+use frazil::snow::grains::{Grains, Object, Params, Surroundings};
 use frazil::sweep::Body;
 
 use crate::common::shapes::cuboid;
 use crate::harness::Harness;
 use crate::scenes::context;
-use crate::snow::grains::{Experiment, FRAME, walls};
+use crate::snow::grains::{Experiment, FRAME, ON_A_FLOOR, walls};
 
 /// Diameter of the grains (m).
 const D: f64 = 0.005;
 
 pub fn run(h: &mut Harness) {
-    cohesion(h);
-    restitution(h);
-    stick(h);
+    h.measure("snow.grains.wall", cohesion);
+    h.measure("snow.grains.restitution", restitution);
+    h.measure_all(["snow.grains.stick_stops", "snow.grains.stick_shakes"], stick);
 }
 
 /// Seeds of the heaps that walls are made of.
 const SEEDS: [u64; 2] = [1, 2];
 
 /// Walls of three heights and three frictions, made to stand up to a height: at 0.85 of it they stand, at 1.15 they fall.
-fn cohesion(h: &mut Harness) {
-    if !h.wants("snow.grains.wall") {
-        return;
-    }
+fn cohesion() -> (bool, &'static str) {
     let mut holds = true;
     for (repose, layers) in [(32.0, 16.0), (32.0, 32.0), (25.0, 20.0), (38.0, 20.0)] {
         let friction = of_repose(repose, true);
@@ -45,7 +42,7 @@ fn cohesion(h: &mut Harness) {
             holds &= low && !high;
         }
     }
-    h.holds("snow.grains.wall", holds, "0.85 of the height stands, 1.15 falls");
+    (holds, "0.85 of the height stands, 1.15 falls")
 }
 
 /// Whether a wall whose support is removed keeps 90 % of the height of its edge, and 99 % of its grains, for 1.25 s.
@@ -88,10 +85,7 @@ fn edge(wall: &Experiment) -> f64 {
 }
 
 /// Two grains that collide, and one that falls on the floor and on a mesh: speed after over speed before.
-fn restitution(h: &mut Harness) {
-    if !h.wants("snow.grains.restitution") {
-        return;
-    }
+fn restitution() -> (f64, &'static str) {
     let mut worst: f64 = 0.0;
     for asked in [0.2, 0.5, 0.9] {
         let mut pair = Experiment::new(1, D, 0.3, 1);
@@ -108,7 +102,7 @@ fn restitution(h: &mut Harness) {
         println!("# restitution {asked}: two grains {met:.3}, floor {floor:.3}, mesh {mesh:.3}");
         worst = [met, floor, mesh].iter().map(|got| (got / asked - 1.0).abs() * 100.0).fold(worst, f64::max);
     }
-    h.gate("snow.grains.restitution", worst, "");
+    (worst, "")
 }
 
 fn plane() -> (Shell, Pose<'static>) {
@@ -170,10 +164,7 @@ impl Motion for Plate {
 }
 
 /// Share (%) of the grains below a plate that still hang there after it has moved and stopped, and after it has shaken.
-fn stick(h: &mut Harness) {
-    if !h.wants("snow.grains.stick_stops") && !h.wants("snow.grains.stick_shakes") {
-        return;
-    }
+fn stick() -> [(f64, &'static str); 2] {
     let ctx: Context = context(2);
     let mesh = cuboid([0.2, 0.02, 0.2]);
     let positions = mesh.positions.iter().map(|position| position.cast::<f64>()).collect();
@@ -187,14 +178,7 @@ fn stick(h: &mut Harness) {
         .collect();
     grains.emit(&sites, &[], 0).expect("grains");
     let objects = [Object { stick: 5.0, ..Object::new(&body, 0.5) }];
-    let around = Surroundings {
-        base: Base::Missing,
-        objects: &objects,
-        statics: &[],
-        ground: &[],
-        floor: None,
-        lowest: -100.0,
-    };
+    let around = Surroundings { objects: &objects, floor: None, lowest: -100.0, ..ON_A_FLOOR };
     let mut hanging = |frames: std::ops::Range<i32>| {
         let last = f64::from(frames.end) * FRAME;
         for frame in frames {
@@ -209,8 +193,10 @@ fn stick(h: &mut Harness) {
         near as f64 * 100.0 / sites.len() as f64
     };
     let (stopped, shaken) = (hanging(0..36), hanging(36..60));
-    h.gate("snow.grains.stick_stops", stopped, "share of 400 grains below a plate, by five weights");
-    h.gate("snow.grains.stick_shakes", shaken, "after 24 frames by up to fifty weights");
+    [
+        (stopped, "share of 400 grains below a plate, by five weights"),
+        (shaken, "after 24 frames by up to fifty weights"),
+    ]
 }
 
 fn body_bottom(body: &Body) -> f64 {

@@ -1,14 +1,12 @@
 //! Gate of the memory of grains in a step, measured in a process of its own.
 
 use frazil::geometry::DVec3;
-use frazil::snow::grains::{Base, Grains, Params, Surroundings, memory};
+use frazil::snow::grains::{Grains, Params, memory};
 
 use crate::harness::Harness;
+use crate::process::{kilobytes, number_of, own, printed};
 use crate::scenes::context;
-use crate::snow::grains::{FRAME, Random};
-
-/// Argument of a run that only steps grains and prints their memory.
-pub const MEMORY: &str = "memory-of-grains";
+use crate::snow::grains::{FRAME, ON_A_FLOOR, Random};
 
 /// Count of grains along each axis of a box of them that settles.
 const SIDES: [u32; 3] = [90, 32, 90];
@@ -16,28 +14,16 @@ const SIDES: [u32; 3] = [90, 32, 90];
 const SETTLE: usize = 10;
 
 pub fn run(h: &mut Harness) {
-    let name = "snow.grains.memory";
-    if !h.wants(name) {
-        return;
-    }
-    in_a_process_of_its_own(h, name, MEMORY);
+    h.measure("snow.grains.memory", || of_a_step("memory-of-grains"));
 }
 
-/// A gate of bytes that a run of this program with an argument prints.
-pub fn in_a_process_of_its_own(h: &mut Harness, name: &str, argument: &str) {
-    let program = std::env::current_exe().expect("this program's path");
-    let output = std::process::Command::new(program).arg(argument).output().expect("a process");
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    text.lines().filter(|line| line.starts_with("# ")).for_each(|line| println!("{line}"));
-    let bytes = text.lines().find_map(|line| line.strip_prefix("bytes ")?.parse().ok());
-    h.gate(
-        name,
-        bytes.expect("a number of bytes"),
-        "the peak of a step, without what the process had before",
-    );
+/// The bytes that a run of this program prints.
+pub fn of_a_step(word: &str) -> (f64, &'static str) {
+    let bytes = number_of(&printed(&mut own(word)), "bytes ").expect("a number of bytes");
+    (bytes, "the peak of a step, without what the process had before")
 }
 
-/// The run with [`MEMORY`].
+/// The run that steps grains and prints their memory.
 pub fn print_memory() {
     let ctx = context(2);
     // Memory of the threads themselves is in the baseline.
@@ -52,26 +38,18 @@ pub fn print_memory() {
         let off = site.map(|at| (f64::from(at) + 0.5 + 0.06 * random.next()) * 1.1 * 2.0 * params.radius);
         positions.push(DVec3::from(off));
     }
-    let before = kilobytes("VmRSS:");
+    let before = kilobytes("self", "VmRSS:");
     let each = |kilobytes: f64| kilobytes * 1024.0 / count as f64;
     grains.emit(&positions, &[], 0).expect("grains");
-    println!("# grains that were added: {:.0} bytes each", each(kilobytes("VmRSS:") - before));
-    let around = Surroundings {
-        base: Base::Missing,
-        objects: &[],
-        statics: &[],
-        ground: &[],
-        floor: Some(0.0),
-        lowest: -1.0,
-    };
+    println!("# grains that were added: {:.0} bytes each", each(kilobytes("self", "VmRSS:") - before));
     for frame in 0..SETTLE {
-        grains.step(&ctx, &around, [0.0, FRAME], frame as i32).expect("a step");
+        grains.step(&ctx, &ON_A_FLOOR, [0.0, FRAME], frame as i32).expect("a step");
     }
     // Returns memory that earlier steps freed to the system, so that only what is in use counts.
     let resident = || {
         // SAFETY: a function of glibc that any thread may call.
         unsafe { malloc_trim(0) };
-        kilobytes("VmRSS:")
+        kilobytes("self", "VmRSS:")
     };
     let between = resident() - before;
     println!("# between two steps (the grains, impulses of contacts, what they touch): {:.0}", each(between));
@@ -81,10 +59,10 @@ pub fn print_memory() {
     resident();
     // From here on the peak is that of one step.
     let is_reset = std::fs::write("/proc/self/clear_refs", "5").is_ok();
-    grains.step(&ctx, &around, [0.0, FRAME], SETTLE as i32).expect("a step");
-    let peak = kilobytes("VmHWM:") - before;
+    grains.step(&ctx, &ON_A_FLOOR, [0.0, FRAME], SETTLE as i32).expect("a step");
+    let peak = kilobytes("self", "VmHWM:") - before;
     println!("# a step adds (that copy, blocks, anchors, pairs in batches): {:.0}", each(peak - between));
-    println!("# after it, before freed memory goes back: {:.0}", each(kilobytes("VmRSS:") - before));
+    println!("# after it, before freed memory goes back: {:.0}", each(kilobytes("self", "VmRSS:") - before));
     println!("# the library reckons with {}", memory(count) / count as u64);
     println!(
         "# {count} grains; the peak is {} one step",
@@ -97,11 +75,4 @@ pub fn print_memory() {
 unsafe extern "C" {
     /// Returns freed memory to the system.
     fn malloc_trim(pad: usize) -> i32;
-}
-
-/// A value of this process' status (kB).
-pub fn kilobytes(name: &str) -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|line| line.strip_prefix(name)).unwrap_or("0");
-    line.split_whitespace().next().and_then(|number| number.parse().ok()).unwrap_or(0.0)
 }

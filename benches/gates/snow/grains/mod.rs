@@ -23,8 +23,8 @@ pub mod turned_gravity;
 
 use frazil::context::Context;
 use frazil::geometry::DVec3;
-use frazil::snow::grains::Params;
 use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap, Pose, Shell};
+use frazil::snow::grains::{Base, Params, Surroundings};
 
 use super::{grains_alone, table_3_1};
 use crate::harness::Harness;
@@ -36,17 +36,17 @@ pub const FRAME: f64 = 1.0 / 24.0;
 /// All of them.
 pub fn run(h: &mut Harness) {
     piles::run(h);
-    preview::run(h);
+    h.measure_all(["snow.grains.preview_volume", "snow.grains.preview_angle"], preview::measure);
     free_motion::run(h);
     beds::run(h);
-    turned_gravity::run(h);
+    h.measure_all(["snow.grains.turned_bed_least", "snow.grains.turned_bed_most"], turned_gravity::measure);
     column_collapse::run(h);
     collapse::run(h);
-    behind_ground::run(h);
-    planes::run(h);
+    h.measure("snow.grains.behind_ground", behind_ground::measure);
+    h.measure_all(["snow.grains.slope_rests", "snow.grains.slope_slides"], planes::measure);
     materials::run(h);
     collisions::run(h);
-    crowd::run(h);
+    h.measure("snow.grains.crowd", crowd::measure);
     grains_alone::run(h);
     births::run(h);
     rest::run(h);
@@ -54,10 +54,20 @@ pub fn run(h: &mut Harness) {
     passes::run(h);
     readers::run(h);
     cancel::run(h);
-    rate::run(h);
+    h.measure("snow.grains.speed", rate::measure);
     table_3_1::run(h);
     memory::run(h);
 }
+
+/// Grains on a floor at a height of 0; nothing else is around them.
+pub const ON_A_FLOOR: Surroundings<'static> = Surroundings {
+    base: Base::Missing,
+    objects: &[],
+    statics: &[],
+    ground: &[],
+    floor: Some(0.0),
+    lowest: -1.0,
+};
 
 /// Grains and what moves them.
 pub struct Experiment {

@@ -2,16 +2,17 @@
 //! from files of changes.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use frazil::geometry::points::Points;
 use frazil::vdb::file::WriteOptions;
 use frazil::vdb::points;
 
-use crate::common::character::{self, data};
+use crate::common::character;
 use crate::harness::{Harness, timed};
-use crate::scenes::context;
+use crate::process::{frazil, quiet, works};
+use crate::scenes::{MAN, context, wanted_data};
 
 /// Frames and cell (m) of the pass whose file is measured: with fewer grains the tree that every file has outweighs them.
 const MEASURED: (i32, f64) = (64, 0.009);
@@ -21,18 +22,12 @@ const REPEATED: (i32, f64) = (32, 0.012);
 pub fn run(h: &mut Harness) {
     let all @ [bytes, same, delta] =
         ["snow.grains.file_bytes", "snow.grains.same_pass", "snow.grains.same_delta"];
-    if !all.iter().any(|name| h.wants(name)) {
-        return;
-    }
-    let Some(man) = data("character/CesiumMan.glb") else {
-        all.iter().for_each(|name| h.skipped(name, "no data"));
-        return;
-    };
+    let Some(man) = wanted_data(h, &all, MAN) else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let made = |(frames, cell): (i32, f64), name: &str, threads: usize| {
         let scene = walk(folder.path(), &man, frames, cell, "");
         let out = folder.path().join(name);
-        let (took, _) = timed(|| assert!(pass(&scene, &out, threads).status().expect("frazil").success()));
+        let (took, _) = timed(|| works(&mut pass(&scene, &out, threads)));
         (scene, out, took)
     };
     if h.wants(bytes) {
@@ -51,7 +46,7 @@ pub fn run(h: &mut Harness) {
         // Short enough that all of them do not finish the shot.
         let kills =
             kill(|threads| pass(&scene, &killed, threads), 0.25 * took, || Some(frames()).filter(|n| *n > 0));
-        assert!(pass(&scene, &killed, 2).status().expect("frazil").success());
+        works(&mut pass(&scene, &killed, 2));
         let [once, alone, killed] = [once, alone, killed].map(|folder| character::output(&folder));
         let note = format!(
             "{} files of a pass of {took:.1} s, after kills at frames {kills:?}; 1 and 2 threads",
@@ -62,8 +57,7 @@ pub fn run(h: &mut Harness) {
     if h.wants(delta) {
         let (scene, full, _) = made(REPEATED, "full", 2);
         let changes = folder.path().join("changes");
-        let mut run = pass(&scene, &changes, 2);
-        assert!(run.args(["--set", "output.grains_mode=delta"]).status().expect("frazil").success());
+        works(pass(&scene, &changes, 2).args(["--set", "output.grains_mode=delta"]));
         let (same, sizes) = rebuilt(&changes, &full, REPEATED.0);
         let note = format!("{} frames, {:.0} % of the bytes", REPEATED.0, 100.0 * sizes[0] / sizes[1]);
         h.holds(delta, same, &note);
@@ -73,9 +67,9 @@ pub fn run(h: &mut Harness) {
 /// Whether the files that are made from a folder of changes are those of a folder of whole ones; the bytes of both folders' files.
 fn rebuilt(changes: &Path, full: &Path, frames: i32) -> (bool, [f64; 2]) {
     let whole = changes.with_file_name("whole.%04d.vdb");
-    let mut rebuild = Command::new(env!("CARGO_BIN_EXE_frazil"));
-    rebuild.args(["vdb", "rebuild", "--stage", "grains", "--frame", &format!("1-{frames}"), "-q"]);
-    assert!(rebuild.arg(changes).arg("-o").arg(&whole).status().expect("frazil").success());
+    let mut rebuild =
+        frazil(["vdb", "rebuild", "--stage", "grains", "--frame", &format!("1-{frames}"), "-q"]);
+    works(rebuild.arg(changes).arg("-o").arg(&whole));
     let file = |out: &Path, frame: i32| out.join(format!("grains/grains.{frame:04}.vdb"));
     let is_same = |frame: i32| {
         let whole = whole.with_file_name(format!("whole.{frame:04}.vdb"));
@@ -129,9 +123,9 @@ pub fn kill<T>(pass: impl Fn(usize) -> Command, within: f64, seen: impl Fn() -> 
 
 /// A pass of a scene, quiet.
 pub fn pass(scene: &Path, out: &Path, threads: usize) -> Command {
-    let mut run = Command::new(env!("CARGO_BIN_EXE_frazil"));
-    run.arg("snow").arg(scene).arg("-o").arg(out).args(["-q", "--threads", &threads.to_string()]);
-    run.stdout(Stdio::null()).stderr(Stdio::null());
+    let mut run = frazil(["snow", "-q", "--threads", &threads.to_string()]);
+    run.arg(scene).arg("-o").arg(out);
+    quiet(&mut run);
     run
 }
 

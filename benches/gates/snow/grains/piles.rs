@@ -81,7 +81,7 @@ impl Experiment {
 
 pub fn run(h: &mut Harness) {
     piles(h);
-    sizes(h);
+    h.measure_all(["snow.grains.pile_size", "snow.grains.pile_creep"], sizes);
 }
 
 /// Slopes of poured piles against the requested ones.
@@ -112,10 +112,7 @@ fn piles(h: &mut Harness) {
 }
 
 /// Slopes of piles of three grain sizes for the same angle, and their change in ten seconds.
-fn sizes(h: &mut Harness) {
-    if !h.wants("snow.grains.pile_size") && !h.wants("snow.grains.pile_creep") {
-        return;
-    }
+fn sizes() -> [(f64, &'static str); 2] {
     let mut slopes = Vec::new();
     let mut creep: f64 = 0.0;
     for diameter in [0.0015, 0.005, 0.02] {
@@ -131,6 +128,5 @@ fn sizes(h: &mut Harness) {
     }
     let most = slopes.iter().copied().fold(f64::MIN, f64::max);
     let least = slopes.iter().copied().fold(f64::MAX, f64::min);
-    h.gate("snow.grains.pile_size", most - least, "");
-    h.gate("snow.grains.pile_creep", creep, "");
+    [(most - least, ""), (creep, "")]
 }

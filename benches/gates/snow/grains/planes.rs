@@ -2,7 +2,6 @@
 
 use frazil::geometry::DVec3;
 
-use crate::harness::Harness;
 use crate::snow::grains::{Experiment, FRAME, still};
 
 /// Diameter of a grain (m).
@@ -12,11 +11,7 @@ const FRAMES: usize = 24;
 /// How far the planes lean from the angle of friction (degrees).
 const OFF: f64 = 3.0;
 
-pub fn run(h: &mut Harness) {
-    let [rests, slides] = ["snow.grains.slope_rests", "snow.grains.slope_slides"];
-    if !h.wants(rests) && !h.wants(slides) {
-        return;
-    }
+pub fn measure() -> [(f64, &'static str); 2] {
     let (mut all_rest, mut all_slide) = (true, true);
     for friction in [0.1, 0.2, 0.3, 0.5] {
         let angle = f64::atan(friction).to_degrees();
@@ -30,8 +25,10 @@ pub fn run(h: &mut Harness) {
         all_rest &= way.abs() < 0.01 * D && is_still;
         all_slide &= (far / expected - 1.0).abs() < 0.1 && !is_caught;
     }
-    h.holds(rests, all_rest, "moved by less than 0.01 diameters in a second, and rests");
-    h.holds(slides, all_slide, "within 10 % of the formula");
+    [
+        (f64::from(all_rest), "moved by less than 0.01 diameters in a second, and rests"),
+        (f64::from(all_slide), "within 10 % of the formula"),
+    ]
 }
 
 /// How far (m) a grain slides down a plane that leans by so many degrees, and whether it rests in the end.

@@ -5,7 +5,6 @@ use std::collections::HashMap;
 use frazil::geometry::DVec3;
 use frazil::snow::grain_friction::of_repose;
 
-use crate::harness::Harness;
 use crate::snow::grains::Experiment;
 
 /// Diameter of the fine grains (m).
@@ -17,11 +16,7 @@ const FRAMES: usize = 240;
 /// Piles of each size.
 const SEEDS: u64 = 3;
 
-pub fn run(h: &mut Harness) {
-    let [volume, angle] = ["snow.grains.preview_volume", "snow.grains.preview_angle"];
-    if !h.wants(volume) && !h.wants(angle) {
-        return;
-    }
+pub fn measure() -> [(f64, &'static str); 2] {
     let mean = |diameter: f64, count: usize| {
         let (mut volumes, mut angles) = (0.0, 0.0);
         for seed in 1..=SEEDS {
@@ -37,8 +32,7 @@ pub fn run(h: &mut Harness) {
     let (fine, coarse) = (mean(D, 8 * COARSE), mean(2.0 * D, COARSE));
     let off = |which: usize| (coarse[which] / fine[which] - 1.0) * 100.0;
     println!("# volume {:+.2} %, angle {:+.2} % with coarse grains", off(0), off(1));
-    h.gate(volume, off(0).abs(), "");
-    h.gate(angle, off(1).abs(), "");
+    [(off(0).abs(), ""), (off(1).abs(), "")]
 }
 
 /// The volume (m3) between the floor and the tops of the balls, as seen from above.

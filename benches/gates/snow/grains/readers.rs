@@ -59,7 +59,7 @@ pub fn run(h: &mut Harness) {
     }
 }
 
-/// All values of the grains by identity, as tests/ctest/grain_reader.cpp writes them.
+/// All values of the grains by identity, as tests/ctest/full/grain_reader.cpp writes them.
 fn records(grains: &Grains) -> Vec<u8> {
     let values = grains.ids().iter().zip(grains.positions()).zip(grains.velocities()).zip(grains.rests());
     let values = values.zip(grains.source_frames()).zip(grains.awake());

@@ -3,6 +3,8 @@
 use frazil::snow::grain_friction::of_repose;
 
 use crate::harness::Harness;
+use crate::process::{json, works};
+use crate::scenes::{MAN, wanted_data};
 use crate::snow::grains::Experiment;
 use crate::snow::grains::passes;
 
@@ -43,31 +45,23 @@ fn changes(h: &mut Harness) {
 
 /// A walker of 96 frames: time of the grains' motion in the last 48 without rest, over that with it.
 fn gain(h: &mut Harness) {
-    if !h.wants("snow.grains.rest_gain") {
-        return;
-    }
-    let Some(man) = crate::common::character::data("character/CesiumMan.glb") else {
-        h.skipped("snow.grains.rest_gain", "no data");
-        return;
-    };
+    let name = "snow.grains.rest_gain";
+    let Some(man) = wanted_data(h, &[name], MAN) else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let seconds = |rests: bool| {
         let scene = passes::walk(folder.path(), &man, 96, 0.009, &format!("rest = {rests}"));
         let out = folder.path().join(format!("rest-{rests}"));
-        let mut run = std::process::Command::new(env!("CARGO_BIN_EXE_frazil"));
-        let run = run.arg("snow").arg(&scene).arg("-o").arg(&out).args(["-q", "--threads", "2"]);
-        assert!(run.stderr(std::process::Stdio::null()).status().expect("frazil").success());
+        works(&mut passes::pass(&scene, &out, 2));
         (49..=96).map(|frame| moving(&out.join(format!("report/grains.{frame:04}.json")))).sum::<f64>()
     };
     let (with, without) = (seconds(true), seconds(false));
     let note = format!("threads=2 {with:.1} s with rest, {without:.1} s without; thesis=1.58 x");
-    h.gate("snow.grains.rest_gain", without / with, &note);
+    h.gate(name, without / with, &note);
 }
 
 /// Time (s) of the phase `move` of a frame, from its report.
 pub fn moving(report: &std::path::Path) -> f64 {
-    let text = std::fs::read(report).expect("a report");
-    let report: serde_json::Value = serde_json::from_slice(&text).expect("a report");
+    let report = json(report);
     let phases = report["phases"].as_array().expect("phases").iter();
     phases.filter(|phase| phase["name"] == "move").filter_map(|phase| phase["seconds"].as_f64()).sum()
 }

@@ -9,7 +9,6 @@ use frazil::geometry::DVec3;
 use frazil::snow::grain_friction::of_repose;
 use frazil::snow::grains::heap::{Pose, Shell};
 
-use crate::harness::Harness;
 use crate::snow::grains::{Experiment, FRAME, Random, rectangle, still, walls};
 
 /// Diameter of a grain (m).
@@ -23,11 +22,7 @@ const LOOSE: [f64; 2] = [1.5, 0.5];
 /// Thickness of the top (diameters).
 const TOP: f64 = 1.5;
 
-pub fn run(h: &mut Harness) {
-    let [least, most] = ["snow.grains.turned_bed_least", "snow.grains.turned_bed_most"];
-    if !h.wants(least) && !h.wants(most) {
-        return;
-    }
+pub fn measure() -> [(f64, &'static str); 2] {
     let mut differences = Vec::new();
     for asked in [25.0, 32.0] {
         let angle = slides(asked, SITES);
@@ -36,8 +31,10 @@ pub fn run(h: &mut Harness) {
     }
     let long = slides(32.0, [2 * SITES[0], SITES[1], SITES[2]]);
     println!("# asked 32 degrees, a bed twice as long: {long:.2}");
-    h.gate(least, differences.iter().copied().fold(f64::MAX, f64::min), "");
-    h.gate(most, differences.iter().copied().fold(f64::MIN, f64::max), "");
+    [
+        (differences.iter().copied().fold(f64::MAX, f64::min), ""),
+        (differences.iter().copied().fold(f64::MIN, f64::max), ""),
+    ]
 }
 
 /// A floor with bumps of up to half a diameter, on which no layer slides as a whole.

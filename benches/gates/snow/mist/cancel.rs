@@ -3,14 +3,13 @@
 use std::cell::Cell;
 use std::ptr::{null, null_mut};
 
-use frazil::capi::level_set::body::{frz_body, frz_body_init};
 use frazil::capi::snow::mist::*;
 use frazil::capi::snow::mist_params::*;
 use frazil::capi::snow::mist_points::*;
 use frazil::capi::{frz_status, frz_view};
 
 use crate::capi::cancel_latency::{Steps, measure};
-use crate::capi::host::{Threads, view, works, written};
+use crate::capi::host::{Threads, body_between, sized, usual, view, works, written};
 use crate::common::shapes::sphere;
 use crate::harness::Harness;
 use crate::snow::grains::{FRAME, Random};
@@ -32,7 +31,9 @@ struct Host {
 
 impl Host {
     fn new(random: &mut Random) -> Self {
-        let mut params = std::mem::MaybeUninit::<frz_mist_params>::uninit();
+        let mut params = usual(frz_mist_params_init);
+        (params.cell, params.from_speed, params.flags) = (CELL, 0.0, FRZ_MIST_FALLING);
+        (params.turbulence, params.confinement) = (3.0, 0.3);
         let mesh = sphere(0.15, 24);
         let at = |x: f32| {
             mesh.positions
@@ -49,28 +50,9 @@ impl Host {
             corners: mesh.triangles.clone(),
             cells: Cell::new(0),
         };
-        // SAFETY: the pointers are valid, and the parameters are filled before they are read.
-        unsafe {
-            works(frz_mist_params_init(params.as_mut_ptr(), size_of::<frz_mist_params>()));
-            let mut params = params.assume_init();
-            (params.cell, params.from_speed, params.flags) = (CELL, 0.0, FRZ_MIST_FALLING);
-            (params.turbulence, params.confinement) = (3.0, 0.3);
-            works(frz_mist_create(host.threads.ctx, &params, null(), 0, &mut host.mist));
-        }
+        // SAFETY: the pointers are valid.
+        unsafe { works(frz_mist_create(host.threads.ctx, &params, null(), 0, &mut host.mist)) };
         host
-    }
-
-    fn body(&self) -> frz_body {
-        let mut body = std::mem::MaybeUninit::<frz_body>::uninit();
-        // SAFETY: the body is filled before it is read.
-        let mut body = unsafe {
-            works(frz_body_init(body.as_mut_ptr(), size_of::<frz_body>()));
-            body.assume_init()
-        };
-        body.positions = view(&self.ball[0]);
-        body.positions_end = view(&self.ball[1]);
-        body.indices = view(self.corners.as_flattened());
-        body
     }
 }
 
@@ -80,13 +62,12 @@ impl Steps for Host {
     }
 
     fn step(&self) -> frz_status {
-        let body = self.body();
+        let body = body_between(self.ball.each_ref().map(Vec::as_slice), &self.corners);
         let [positions, speeds]: [frz_view; 2] = [view(&self.positions), view(&self.speeds)];
-        let mut report = std::mem::MaybeUninit::<frz_mist_report>::zeroed();
-        // SAFETY: the pointers are valid; all zeroes are a report.
-        unsafe {
-            (*report.as_mut_ptr()).struct_size = size_of::<frz_mist_report>() as u32;
-            let status = frz_mist_step_points(
+        let mut report: frz_mist_report = sized();
+        // SAFETY: the pointers are valid.
+        let status = unsafe {
+            frz_mist_step_points(
                 self.threads.ctx,
                 self.mist,
                 positions,
@@ -98,11 +79,11 @@ impl Steps for Host {
                 1,
                 0.0,
                 FRAME,
-                report.as_mut_ptr(),
-            );
-            self.cells.set(self.cells.get().max(report.assume_init().cells));
-            status
-        }
+                &mut report,
+            )
+        };
+        self.cells.set(self.cells.get().max(report.cells));
+        status
     }
 
     fn state(&self) -> Vec<u8> {

@@ -3,7 +3,6 @@
 use frazil::Context;
 use frazil::snow::mist::{Around, Mist, Params};
 
-use crate::harness::Harness;
 use crate::scenes::context;
 use crate::snow::mist::open;
 
@@ -69,16 +68,12 @@ fn best_correlation(one: &[[f32; 3]], other: &[[f32; 3]]) -> f64 {
 }
 
 /// Eddies of a moment are those of the moment before, and later have nothing to do with them, however they are moved.
-pub fn run(h: &mut Harness) {
-    let name = "snow.mist.turbulence_decorrelates";
-    if !h.wants(name) {
-        return;
-    }
+pub fn measure() -> (bool, String) {
     let ctx = context(2);
     let first = eddies(&ctx, 1.0);
     let later = [0.02, 0.2, 0.5, 1.0, 2.0].map(|by| (by, best_correlation(&first, &eddies(&ctx, 1.0 + by))));
     let falls = later[..4].is_sorted_by(|a, b| a.1 >= b.1);
     let note: Vec<String> = later.iter().map(|(by, best)| format!("{best:.2} after {by} s")).collect();
     let is_right = later[0].1 > 0.95 && later[3].1 < 0.5 && later[4].1 < 0.5;
-    h.holds(name, falls && is_right, &format!("best correlation over all shifts {}", note.join(", ")));
+    (falls && is_right, format!("best correlation over all shifts {}", note.join(", ")))
 }

@@ -3,14 +3,10 @@
 use frazil::Context;
 use frazil::flow::Tiles;
 use frazil::geometry::DVec3;
-use frazil::snow::base_layer::initial::{Cover, Ground, layer};
-use frazil::snow::base_layer::{BaseLayer, Params as BaseParams};
 use frazil::snow::mist::{Around, Mist, Params, Source, Start, Surroundings};
-use frazil::sweep::Body;
 
 use crate::common::shapes::cuboid;
-use crate::harness::Harness;
-use crate::scenes::{EXACT, body, context};
+use crate::scenes::{EXACT, body, context, layer};
 use crate::snow::mist::open;
 
 /// Edge of a cell of air (m).
@@ -19,10 +15,6 @@ const CELL: f64 = 0.0133;
 const CHECKS: [f64; 4] = [1.0 / 12.0, 1.0 / 6.0, 1.0 / 3.0, 2.0 / 3.0];
 /// Gravity (m/s2), and the velocity that grains keep of a second's in the air.
 const GRAVITY: f64 = -9.81;
-
-pub fn run(h: &mut Harness) {
-    frame_rate(h);
-}
 
 /// A grain that lies still until it is thrown, and then flies.
 #[derive(Clone, Copy)]
@@ -51,7 +43,7 @@ impl Flight {
 }
 
 /// Numbers 0..1 that are the same in every run.
-fn numbers(mut seed: u64) -> impl FnMut() -> f64 {
+pub fn numbers(mut seed: u64) -> impl FnMut() -> f64 {
     move || {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (seed >> 40) as f64 / f64::from(1 << 24)
@@ -107,15 +99,11 @@ fn ploughed() -> Vec<Flight> {
 fn made(ctx: &Context, flights: &[Flight], fps: f64, plough: bool) -> Vec<Mist> {
     let mut mist = Mist::new(Params::for_cell(CELL)).expect("mist");
     let mut scene = plough.then(|| {
-        let area = [-0.3, -0.6, 0.3, 0.9];
-        let snow = layer(ctx, &Ground::Plane { height: 0.0, area }, &[], &Cover::Depth(0.12), 0.01, 3.0);
-        let params: BaseParams = EXACT;
-        let base = BaseLayer::new(ctx, snow.expect("snow"), params).expect("a base layer");
+        let base = layer(ctx, 0.0, [-0.3, -0.6, 0.3, 0.9], 0.12, 0.01, EXACT);
         let mut plate = cuboid([0.4, 0.3, 0.06]);
         plate.positions.iter_mut().for_each(|at| at.y += 0.16);
         let at = [0.0, 2.0].map(|time| DVec3::z() * (front(time) - 0.03));
-        let body: Body = body(plate, at, [DVec3::zeros(); 2], 2.0);
-        (base, body)
+        (base, body(plate, at, [DVec3::zeros(); 2], 2.0))
     });
     let mut out = Vec::new();
     let frames = (CHECKS[CHECKS.len() - 1] * fps).round() as i32;
@@ -184,11 +172,8 @@ fn in_blocks(mist: &Mist) -> std::collections::BTreeMap<[i32; 3], [f64; 4]> {
     out
 }
 
-fn frame_rate(h: &mut Harness) {
-    let name = "snow.mist.frame_rate";
-    if !h.wants(name) {
-        return;
-    }
+/// How far mist of fewer frames a second is from that of 96.
+pub fn measure() -> (f64, String) {
     let ctx = context(2);
     let (mut worst, mut note) = (0.0f64, String::new());
     for (scene, flights, plough) in
@@ -211,5 +196,5 @@ fn frame_rate(h: &mut Harness) {
             }
         }
     }
-    h.gate(name, worst, &note);
+    (worst, note)
 }

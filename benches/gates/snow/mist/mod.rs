@@ -9,32 +9,31 @@ pub mod walls;
 use std::time::Instant;
 
 use frazil::Context;
-use frazil::flow::tiles::padded;
+use frazil::flow::tiles::{padded, shifted};
 use frazil::flow::{Coord, Faces, Flow, Scheme, Solids, Tile, Tiles};
 use frazil::geometry::DVec3;
 use frazil::snow::mist::{Around, Boundary, Mist, Params, Source, StepReport};
 
 use crate::harness::Harness;
+use crate::process::kilobytes;
 use crate::scenes::context;
-use crate::snow::grains::memory::{in_a_process_of_its_own, kilobytes};
+use crate::snow::grains::memory::of_a_step;
 
-/// Argument of a run that only steps mist and prints its memory.
-pub const MEMORY: &str = "memory-of-mist";
 /// Length of a frame (s).
 const FRAME: f64 = 1.0 / 24.0;
 /// Edge of a cell (m).
 const CELL: f64 = 0.01;
 
 pub fn run(h: &mut Harness) {
-    projection(h);
-    still(h);
-    symmetry(h);
-    vortices(h);
+    h.measure_all(["snow.mist.divergence", "snow.mist.density_negative"], projection);
+    h.measure("snow.mist.still", still);
+    h.measure("snow.mist.symmetry", symmetry);
+    h.measure("snow.mist.taylor_green", vortices);
     mass(h);
-    padding(h);
-    dashes(h);
-    speed(h);
-    memory(h);
+    h.measure("snow.mist.padding", padding);
+    h.measure("snow.mist.dashes", dashes);
+    h.measure("snow.mist.speed", speed);
+    h.measure("snow.mist.memory", || of_a_step("memory-of-mist"));
 }
 
 /// Steps mist through a frame, the first one is 0.
@@ -82,11 +81,7 @@ fn puff(params: Params, radius: f32, speed: f32) -> Mist {
 }
 
 /// Divergence after projections and least density, while a puff is blown past a ball that moves.
-fn projection(h: &mut Harness) {
-    let names = ["snow.mist.divergence", "snow.mist.density_negative"];
-    if !names.iter().any(|name| h.wants(name)) {
-        return;
-    }
+fn projection() -> [(f64, String); 2] {
     let ctx = context(2);
     let mut mist = puff(air(), 8.0, 2.0);
     let (mut left, mut least, mut iterations) = (0.0f64, 0.0f32, 0);
@@ -100,8 +95,10 @@ fn projection(h: &mut Harness) {
         iterations = iterations.max(report.iterations);
         least = mist.flow().density().iter().flatten().fold(least, |least, value| least.min(*value));
     }
-    h.gate(names[0], left, &format!("in 24 frames, at most {iterations} iterations in one"));
-    h.gate(names[1], f64::from(-least), "");
+    [
+        (left, format!("in 24 frames, at most {iterations} iterations in one")),
+        (f64::from(-least), String::new()),
+    ]
 }
 
 /// Faces of a ball around a position (fine cells), of a radius (fine cells), that moves along x at a speed (m/s), for cells of an
@@ -135,11 +132,7 @@ fn ball(tiles: &Tiles, cell: f32, position: [f32; 3], radius: f32, speed: f32) -
 }
 
 /// A closed box that is full of mist: gravity must not move it.
-fn still(h: &mut Harness) {
-    let name = "snow.mist.still";
-    if !h.wants(name) {
-        return;
-    }
+fn still() -> (f64, &'static str) {
     let ctx = context(2);
     let mut mist = Mist::new(air()).expect("mist");
     mist.add(&tiles_of([0; 3], [4; 3]), |_| (1.0, [0.0; 3]));
@@ -147,7 +140,7 @@ fn still(h: &mut Harness) {
     for frame in 0..100 {
         step(&mut mist, &ctx, &[], &boundary, frame);
     }
-    h.gate(name, f64::from(mist.flow().fastest()), "100 frames in a box of 32 cells");
+    (f64::from(mist.flow().fastest()), "100 frames in a box of 32 cells")
 }
 
 /// Walls around the tiles from 0 to some on each axis; everything outside is solid. Cells may be wider than these tiles'.
@@ -155,14 +148,24 @@ fn closed(tiles: &Tiles, wider: f32, high: [i32; 3]) -> Solids {
     let inside = |cell: [i32; 3]| {
         (0..3).all(|axis| (0.0..8.0 * high[axis] as f32).contains(&((cell[axis] as f32 + 0.5) * wider)))
     };
+    walled(tiles, inside, |_, _| 0.0)
+}
+
+/// Faces that are open between two cells that are inside, each with a speed (m/s) by its upper cell and its axis.
+pub fn walled(
+    tiles: &Tiles,
+    is_inside: impl Fn([i32; 3]) -> bool,
+    speed: impl Fn([i32; 3], usize) -> f32,
+) -> Solids {
     let faces = |coord: &Coord| {
         let mut faces = Faces::open();
         for cell in 0..512usize {
             let at = [cell >> 6, cell >> 3 & 7, cell & 7];
             let at = [0, 1, 2].map(|axis| coord[axis] * 8 + at[axis] as i32);
             for axis in 0..3 {
-                let below = frazil::flow::tiles::shifted(at, axis, -1);
-                faces.open[axis][cell] = f32::from(u8::from(inside(at) && inside(below)));
+                let below = shifted(at, axis, -1);
+                faces.open[axis][cell] = f32::from(u8::from(is_inside(at) && is_inside(below)));
+                faces.speed[axis][cell] = speed(at, axis);
             }
         }
         faces
@@ -171,11 +174,7 @@ fn closed(tiles: &Tiles, wider: f32, high: [i32; 3]) -> Solids {
 }
 
 /// A puff that is the same on both sides stays so.
-fn symmetry(h: &mut Harness) {
-    let name = "snow.mist.symmetry";
-    if !h.wants(name) {
-        return;
-    }
+fn symmetry() -> (f64, &'static str) {
     let ctx = context(2);
     let mut mist = puff(air(), 6.0, 1.0);
     for frame in 0..24 {
@@ -191,15 +190,11 @@ fn symmetry(h: &mut Harness) {
             off = off.max((value - mirrored.map_or(0.0, |tile| tile[cell ^ 0o700])).abs());
         }
     }
-    h.gate(name, f64::from(off / most), "a puff after 24 frames, over its greatest density");
+    (f64::from(off / most), "a puff after 24 frames, over its greatest density")
 }
 
 /// Taylor and Green's vortices in a closed box: how much smaller the error is with cells half as wide.
-fn vortices(h: &mut Harness) {
-    let name = "snow.mist.taylor_green";
-    if !h.wants(name) {
-        return;
-    }
+fn vortices() -> (f64, String) {
     let ctx = context(2);
     let errors = [2, 4, 8].map(|tiles| vortex_error(&ctx, tiles));
     let note = format!(
@@ -209,7 +204,7 @@ fn vortices(h: &mut Harness) {
         errors[2],
         errors[0] / errors[1]
     );
-    h.gate(name, errors[1] / errors[2], &note);
+    (errors[1] / errors[2], note)
 }
 
 fn vortex_error(ctx: &Context, tiles: i32) -> f64 {
@@ -291,11 +286,7 @@ fn mass(h: &mut Harness) {
 }
 
 /// The same puff with one tile of air around it and with three.
-fn padding(h: &mut Harness) {
-    let name = "snow.mist.padding";
-    if !h.wants(name) {
-        return;
-    }
+fn padding() -> (f64, &'static str) {
     let ctx = context(2);
     let [near, far] = [1, 3].map(|padding| {
         let mut mist = puff(Params { padding, ..air() }, 8.0, 1.0);
@@ -312,15 +303,11 @@ fn padding(h: &mut Harness) {
             sum += f64::from(*a);
         }
     }
-    h.gate(name, off / sum * 100.0, "difference of the densities after 24 frames");
+    (off / sum * 100.0, "difference of the densities after 24 frames")
 }
 
 /// A grain at 5 m/s leaves no gaps.
-fn dashes(h: &mut Harness) {
-    let name = "snow.mist.dashes";
-    if !h.wants(name) {
-        return;
-    }
+fn dashes() -> (f64, String) {
     let ctx = context(2);
     let mut mist = Mist::new(Params { gravity: 0.0, ..air() }).expect("mist");
     let velocity = [5.0f32 / 2f32.sqrt(), 5.0 / 2f32.sqrt(), 0.0];
@@ -354,7 +341,7 @@ fn dashes(h: &mut Harness) {
     };
     // Mist of earlier frames moves away from where it was raised.
     let ((last, mean), (all, _)) = (gaps([5.0, 6.0]), gaps([2.0, 6.0]));
-    h.gate(name, last, &format!("in the last frame, mean density {mean:.2}; in the last four {all:.3}"));
+    (last, format!("in the last frame, mean density {mean:.2}; in the last four {all:.3}"))
 }
 
 /// Mist of two million cells that whirls.
@@ -374,11 +361,7 @@ fn large(tiles: i32) -> Mist {
     mist
 }
 
-fn speed(h: &mut Harness) {
-    let name = "snow.mist.speed";
-    if !h.wants(name) {
-        return;
-    }
+fn speed() -> (f64, String) {
     let ctx = context(2);
     let mut mist = large(14);
     let mut note = String::new();
@@ -396,22 +379,14 @@ fn speed(h: &mut Harness) {
     }
     seconds.remove(0);
     seconds.sort_by(f64::total_cmp);
-    h.gate(name, seconds[seconds.len() / 2], &note);
+    (seconds[seconds.len() / 2], note)
 }
 
-fn memory(h: &mut Harness) {
-    let name = "snow.mist.memory";
-    if !h.wants(name) {
-        return;
-    }
-    in_a_process_of_its_own(h, name, MEMORY);
-}
-
-/// The run with [`MEMORY`].
+/// The run that steps mist and prints its memory.
 pub fn print_memory() {
     let ctx = context(2);
     ctx.pool().install(|| rayon::broadcast(|_| vec![1u8; 1 << 16].len()));
-    let before = kilobytes("VmRSS:");
+    let before = kilobytes("self", "VmRSS:");
     let mut mist = large(14);
     let mut cells = 0;
     for frame in 0..3 {
@@ -419,7 +394,7 @@ pub fn print_memory() {
     }
     println!(
         "# between two steps {:.0} bytes a cell",
-        (kilobytes("VmRSS:") - before) * 1024.0 / cells as f64
+        (kilobytes("self", "VmRSS:") - before) * 1024.0 / cells as f64
     );
-    println!("bytes {}", (kilobytes("VmHWM:") - before) * 1024.0 / cells as f64);
+    println!("bytes {}", (kilobytes("self", "VmHWM:") - before) * 1024.0 / cells as f64);
 }

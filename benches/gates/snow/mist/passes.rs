@@ -6,9 +6,11 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::SystemTime;
 
-use crate::common::character::{self, data};
+use crate::common::character;
 use crate::common::clients;
 use crate::harness::{Harness, timed};
+use crate::process::works;
+use crate::scenes::{MAN, wanted_data};
 use crate::snow::grains::passes::{kill, pass, walk};
 
 /// Frames of the pass, and its cell (m).
@@ -22,13 +24,7 @@ const STAGES: [&str; 3] = ["mist", "grains", "base"];
 
 pub fn run(h: &mut Harness) {
     let all @ [same, apart, blender] = ["snow.mist.same_bytes", "snow.mist.apart", "snow.shot.blender_parts"];
-    if !all.iter().any(|name| h.wants(name)) {
-        return;
-    }
-    let Some(man) = data("character/CesiumMan.glb") else {
-        all.iter().for_each(|name| h.skipped(name, "no data"));
-        return;
-    };
+    let Some(man) = wanted_data(h, &all, MAN) else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let scene = walk(folder.path(), &man, FRAMES, CELL, "");
     let out = |name: &str| folder.path().join(name);
@@ -94,10 +90,6 @@ fn misty(scene: &Path, out: &Path, threads: usize) -> Command {
     let mut run = pass(scene, out, threads);
     run.args(["--set", &format!("mist.from_speed={FROM_SPEED}")]);
     run
-}
-
-fn works(run: &mut Command) {
-    assert!(run.status().expect("frazil").success());
 }
 
 /// When the files that a pass is for were written, but for what it says of the run as a whole.

@@ -1,6 +1,7 @@
 //! Gates of mist beside solids that move: what flows through them, and pockets that they seal off.
 
-use frazil::flow::{Coord, Faces, Flow, Solids, Tiles};
+use frazil::flow::tiles::shifted;
+use frazil::flow::{Coord, Flow, Solids, Tiles};
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::mist::{Around, Mist, Params, Surroundings};
@@ -9,14 +10,15 @@ use frazil::sweep::Body;
 use crate::common::shapes::cuboid;
 use crate::harness::Harness;
 use crate::scenes::context;
+use crate::snow::mist::walled;
 
 /// Length of a frame (s), and edge of a cell (m).
 const FRAME: f64 = 1.0 / 24.0;
 const CELL: f64 = 0.01;
 
 pub fn run(h: &mut Harness) {
-    flux(h);
-    pocket(h);
+    h.measure("snow.mist.flux", flux);
+    h.measure("snow.mist.pocket", pocket);
 }
 
 /// Outer edge (m) and wall (m) of a hollow box, and how fast it moves (m/s).
@@ -28,11 +30,7 @@ const FRAMES: i32 = 12;
 
 /// A box with a closed hollow inside is drawn through mist: the share of the mist on its way that is inside it in the end. What
 /// does not flow around it flows through its walls.
-fn flux(h: &mut Harness) {
-    let name = "snow.mist.flux";
-    if !h.wants(name) {
-        return;
-    }
+fn flux() -> (f64, String) {
     let ctx = context(2);
     let params = Params { half_life: f64::INFINITY, gravity: 0.0, ..Params::for_cell(CELL) };
     let mut mist = Mist::new(params).expect("mist");
@@ -52,7 +50,7 @@ fn flux(h: &mut Harness) {
     let way = SPEED * f64::from(FRAMES) * FRAME;
     let inside = inside(&mist, way);
     let swept = f64::from(EDGE).powi(2) * (way - 0.06);
-    h.gate(name, inside / swept, &format!("{inside:.3e} m3 inside, {swept:.3e} m3 on the way of {way} m"));
+    (inside / swept, format!("{inside:.3e} m3 inside, {swept:.3e} m3 on the way of {way} m"))
 }
 
 /// The box, which starts with its front 6 cm before the mist, and moves along x.
@@ -87,11 +85,7 @@ fn inside(mist: &Mist, way: f64) -> f64 {
 }
 
 /// A closed box whose lid comes down until no cell is left open: every projection is solved, and finite.
-fn pocket(h: &mut Harness) {
-    let name = "snow.mist.pocket";
-    if !h.wants(name) {
-        return;
-    }
+fn pocket() -> (bool, String) {
     let ctx = context(2);
     let mut flow = Flow::new(CELL, [0.0; 3]).expect("a flow");
     flow.resize(&[[0, 0, 0], [0, 0, 1], [0, 1, 0], [0, 1, 1], [1, 0, 0], [1, 0, 1], [1, 1, 0], [1, 1, 1]]);
@@ -106,7 +100,7 @@ fn pocket(h: &mut Harness) {
         most = most.max(solved.iterations);
         flow.advect(&ctx, 0.01, Default::default()).expect("no cancel");
     }
-    h.holds(name, is_solved, &format!("at most {most} iterations, {fastest:.2} m/s under a lid of 0.5 m/s"));
+    (is_solved, format!("at most {most} iterations, {fastest:.2} m/s under a lid of 0.5 m/s"))
 }
 
 /// Walls around the cells from 2 to 14 on each axis, and a lid over them at a height (fine cells) that comes down at 0.5 m/s.
@@ -115,20 +109,9 @@ fn lidded(tiles: &Tiles, wider: f32, lid: f32) -> Solids {
         let middle = cell.map(|x| (x as f32 + 0.5) * wider);
         middle.iter().all(|x| (2.0..14.0).contains(x)) && middle[1] < lid
     };
-    let faces = |coord: &Coord| {
-        let mut faces = Faces::open();
-        for cell in 0..512usize {
-            let at = [cell >> 6, cell >> 3 & 7, cell & 7];
-            let at = [0, 1, 2].map(|axis| coord[axis] * 8 + at[axis] as i32);
-            for axis in 0..3 {
-                let below = frazil::flow::tiles::shifted(at, axis, -1);
-                faces.open[axis][cell] = f32::from(u8::from(is_inside(at) && is_inside(below)));
-                if axis == 1 && is_inside(below) && !is_inside(at) && at[1] as f32 * wider > 2.0 {
-                    faces.speed[axis][cell] = -0.5;
-                }
-            }
-        }
-        faces
-    };
-    Solids::new(tiles, (0..).zip(tiles.coords()).map(|(slot, coord)| (slot, faces(coord))).collect())
+    walled(tiles, is_inside, |at, axis| {
+        let is_lid =
+            axis == 1 && is_inside(shifted(at, 1, -1)) && !is_inside(at) && at[1] as f32 * wider > 2.0;
+        if is_lid { -0.5 } else { 0.0 }
+    })
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::cli::options::of_frame;
 use crate::cli::session::Session;
 use crate::cli::vdb::far_mesh;
 use frazil::geometry::TriMesh;
@@ -179,9 +180,4 @@ fn solid(ctx: &Context, path: &Path, name: Option<&str>) -> Result<FloatGrid> {
     let what =
         format!("grid \"{}\" is solid everywhere outside of its voxels: turn it inside out", grid.name());
     Err(Error::file(path, what))
-}
-
-/// The file of a frame, from one file or a sequence.
-pub(in crate::cli::vdb::from_particles) fn of_frame(path: &Path, frame: i32) -> PathBuf {
-    Pattern::parse(path).map_or_else(|| path.to_path_buf(), |pattern| pattern.path(frame))
 }

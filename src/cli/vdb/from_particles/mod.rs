@@ -9,12 +9,11 @@ use serde_json::json;
 
 use super::{Packing, check_name};
 use crate::cli::each::Each;
-use crate::cli::options::{MeshSpace, positive, triple};
+use crate::cli::options::{MeshSpace, needs_frames, of_frame, one_frame, positive, refuse_one_file, triple};
 use crate::cli::output;
 use crate::cli::points::points_of_vdb;
 use crate::cli::session::Session;
 use crate::cli::session::exit::{Failure, Phase};
-use crate::cli::vdb::from_particles::colliders::of_frame;
 use colliders::Colliders;
 use frazil::geometry::mesh::attributes::{Number, On};
 use frazil::geometry::points::{Attribute, Values};
@@ -22,7 +21,7 @@ use frazil::geometry::{DVec3, MeshArray, TriMesh};
 use frazil::io::files::sequence::Pattern;
 use frazil::io::mesh::extension;
 use frazil::io::particles::{self, ParticleData};
-use frazil::scene::{FrameChoice, Frames};
+use frazil::scene::FrameChoice;
 use frazil::surface::{TOO_FAR, estimate_spacing, rough_spacing, specks, transfer};
 use frazil::vdb::file;
 use frazil::vdb::level_set::to_mesh;
@@ -106,15 +105,10 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
         let Some(path) = path else { continue };
         check_name(path, extensions)?;
         if !args.attributes.is_empty() && extensions.contains(&"ply") && extension(path) != "ply" {
-            let what = format!("{}: only .ply files hold --attributes", path.display());
-            return Err(Failure::refused(what));
+            return Err(Failure::of_file(path, "only .ply files hold --attributes"));
         }
         output::check_writable(path).before()?;
-        let pattern = Pattern::parse(path);
-        if pattern.is_none() && frames.count() > 1 {
-            let what = format!("{}: several frames need a pattern such as level.%04d.vdb", path.display());
-            return Err(Failure::refused(what));
-        }
+        refuse_one_file(path, &frames, "level.%04d.vdb")?;
         for frame in frames.iter() {
             let inputs: Vec<PathBuf> = args.inputs().map(|input| of_frame(input, frame)).collect();
             output::refuse_input(&of_frame(path, frame), inputs.iter().map(PathBuf::as_path)).before()?;
@@ -176,15 +170,12 @@ impl Args {
     fn frames(&self, is_sequence: bool) -> std::result::Result<FrameChoice, Failure> {
         let sequence = self.inputs().find(|path| Pattern::parse(path).is_some());
         match (&self.frames, sequence) {
-            (None, Some(path)) => {
-                let what = format!("{}: a sequence needs --frames A-B", path.display());
-                Err(Failure::refused(what))
-            }
+            (None, Some(path)) => Err(needs_frames(path)),
             (Some(frames), _) if !is_sequence && frames.count() > 1 => {
                 Err(Failure::refused("several --frames are of no use with one file of particles"))
             }
             (Some(frames), _) => Ok(frames.clone()),
-            (None, None) => Ok(FrameChoice::from(Frames { first: 1, last: 1 })),
+            (None, None) => Ok(one_frame()),
         }
     }
 

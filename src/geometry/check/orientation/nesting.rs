@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::geometry::check::deviation::Facet;
+use crate::geometry::shape::bounds;
 use crate::geometry::spatial::bvh::Bvh;
 use crate::geometry::{DVec3, TriMesh, Vec3};
 
@@ -136,9 +137,7 @@ struct Space<'a> {
 
 impl<'a> Space<'a> {
     fn of(shapes: &'a [Shape]) -> Self {
-        let nowhere = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
-        let all = shapes.iter().flat_map(Shape::corners);
-        let (low, high) = all.fold(nowhere, |(low, high), p| (low.inf(&p), high.sup(&p)));
+        let (low, high) = bounds(shapes.iter().flat_map(Shape::corners));
         let (mut corners, mut owner) = (Vec::new(), Vec::new());
         for (shape, part) in shapes.iter().zip(0..).filter(|(shape, _)| shape.sign() != 0) {
             corners.extend(shape.triangles.iter().map(|corners| corners.map(|p| (p - low).cast::<f32>())));

@@ -7,6 +7,7 @@ use crate::geometry::check::edges::{
     Agreement, Use, agree, edge_uses, imbalance, is_same_edge, parts_of, sound,
 };
 use crate::geometry::check::topology::Sets;
+use crate::geometry::shape::{bounds, six_volumes};
 use crate::geometry::spatial::bvh::Bvh;
 use crate::geometry::{DVec3, TriMesh};
 
@@ -220,10 +221,8 @@ impl<'a> Pieces<'a> {
 
     /// Signed volume (m3) of triangles, 0 where rounding decides, with their minimum corner and their size (m).
     fn volume(&self, triangles: &[u32]) -> (f64, DVec3, f64) {
-        let nowhere = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
-        let corners = triangles.iter().flat_map(|at| self.corners(*at as usize));
-        let (low, high) = corners.fold(nowhere, |(low, high), p| (low.inf(&p), high.sup(&p)));
-        let six = triangles.iter().map(|at| six_of(&self.corners(*at as usize), low));
+        let (low, high) = bounds(triangles.iter().flat_map(|at| self.corners(*at as usize)));
+        let six = triangles.iter().map(|at| six_volumes(&self.corners(*at as usize), &low));
         let size = (high - low).norm();
         (substantial(six.sum::<f64>() / 6.0, size), low, size)
     }
@@ -282,7 +281,8 @@ impl<'a> Pieces<'a> {
                 shape.can_turn = shape.triangles.iter().map(of_caps).sum::<f64>() <= CAPS * own;
                 let six =
                     part.iter().map(|at| self.corners(*at as usize)).chain(shape.triangles.iter().copied());
-                shape.volume = substantial(six.map(|corners| six_of(&corners, low)).sum::<f64>() / 6.0, size);
+                shape.volume =
+                    substantial(six.map(|corners| six_volumes(&corners, &low)).sum::<f64>() / 6.0, size);
             }
         }
         shape
@@ -327,12 +327,6 @@ impl<'a> Pieces<'a> {
         }
         out
     }
-}
-
-/// Six times the signed volume (m3) of the tetrahedron over a triangle with its apex at an origin.
-fn six_of(corners: &[DVec3; 3], origin: DVec3) -> f64 {
-    let [a, b, c] = corners.map(|p| p - origin);
-    a.dot(&b.cross(&c))
 }
 
 /// The volume of a part of this size, or 0 where rounding decides.

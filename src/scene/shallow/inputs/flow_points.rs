@@ -1,6 +1,6 @@
 //! Sources, drains and absorbers of a scene, frame by frame.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::geometry::TriMesh;
 use crate::scene::Scene;
 use crate::scene::shallow::{Inputs, Point, Shallow};
@@ -41,10 +41,7 @@ pub(in crate::scene::shallow) fn position(
     points: &[FlowPoint],
 ) -> Result<()> {
     let named = |index: usize| of.points[index].title();
-    liquid.set_flows(points, named).map_err(|error| match error {
-        Error::Argument(what) => Error::file(&scene.path, what),
-        other => other,
-    })
+    liquid.set_flows(points, named).map_err(|error| error.in_file(&scene.path))
 }
 
 /// Moves, opens and closes the points, from their last state to that over the step to the next frame.

@@ -70,33 +70,11 @@ fn spread(liquid: &mut shallow::Shallow, columns: &[usize], volume: f64) -> f64 
 impl Pour {
     /// The columns in its circle, chosen as for a source: in each cell the one that contains its centre's height, or is nearest to it.
     fn columns(&self, columns: &Columns) -> Vec<usize> {
-        let grid = &columns.grid;
         let [x, y, z] = self.at;
-        let reach = self.radius / grid.cell + 1.0;
-        let range = |axis: usize, at: f64| {
-            let centre = (at - grid.origin[axis]) / grid.cell;
-            let last = grid.size[axis] as f64 - 1.0;
-            let [low, high] = [centre - reach, centre + reach].map(|at| at.floor().clamp(0.0, last) as usize);
-            low..=high
-        };
-        let mut cells: Vec<[usize; 2]> = Vec::new();
-        for row in range(1, z) {
-            for across in range(0, x) {
-                let [cx, cz] = grid.centre([across, row]);
-                if (cx - x).powi(2) + (cz - z).powi(2) <= self.radius * self.radius {
-                    cells.push([across, row]);
-                }
-            }
-        }
+        let mut cells: Vec<[usize; 2]> = columns.grid.in_circle([x, z], self.radius).collect();
         if cells.is_empty() {
-            cells.extend(grid.cell_at([x, z]));
+            cells.extend(columns.grid.cell_at([x, z]));
         }
-        let off = |index: usize| {
-            let [base, ceiling] = [columns.bases()[index], columns.ceilings()[index]]
-                .map(|height| columns.heights.metres(height));
-            (base - y).max(y - ceiling).max(0.0)
-        };
-        let nearest = |cell: [usize; 2]| columns.of_cell(cell).min_by(|&i, &j| off(i).total_cmp(&off(j)));
-        cells.into_iter().filter_map(nearest).collect()
+        cells.into_iter().filter_map(|cell| Some(columns.nearest(cell, y)?.0)).collect()
     }
 }

@@ -1,11 +1,11 @@
 //! Scalars that the liquid of a scene carries: dyes, ages, and decaying quantities.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::scene::Scene;
 use crate::scene::schema::{Table, Value, Values};
 use crate::scene::shallow::{ML, Point, Shallow};
 use crate::shallow::scalars::MOST;
-use crate::shallow::{self, Law, Scalar, ScalarBalance, Thickening};
+use crate::shallow::{self, Law, Scalar, Thickening};
 
 /// Names of arrays that the surface already has in some file format.
 const TAKEN: [&str; 13] =
@@ -191,10 +191,7 @@ impl Shallow {
         if scalars.is_empty() {
             return Ok(());
         }
-        liquid.set_scalars(&scalars).map_err(|error| match error {
-            Error::Argument(what) => Error::file(&scene.path, format!("scalar.1: {what}")),
-            other => other,
-        })
+        liquid.set_scalars(&scalars).map_err(|error| error.in_file_at(&scene.path, "scalar.1: "))
     }
 
     /// Sets the scalars of sources, once the sources are set.
@@ -221,20 +218,17 @@ pub(in crate::scene::shallow) fn balances(
     scalars
         .map(|(index, scalar)| {
             let balance = liquid.scalar_balance(index)?;
-            let ScalarBalance {
-                inside, poured, sourced, drained, absorbed, lost, gained, held, falling, ..
-            } = balance;
             let ml = |amount: f64| amount / ML;
             let balance = serde_json::json!({
-                "inside_ml": ml(inside),
-                "poured_ml": ml(poured),
-                "sourced_ml": ml(sourced),
-                "drained_ml": ml(drained),
-                "absorbed_ml": ml(absorbed),
-                "lost_ml": ml(lost),
-                "gained_ml": ml(gained),
-                "held_ml": ml(held),
-                "falling_ml": ml(falling),
+                "inside_ml": ml(balance.inside),
+                "poured_ml": ml(balance.poured),
+                "sourced_ml": ml(balance.sourced),
+                "drained_ml": ml(balance.drained),
+                "absorbed_ml": ml(balance.absorbed),
+                "lost_ml": ml(balance.lost),
+                "gained_ml": ml(balance.gained),
+                "held_ml": ml(balance.held),
+                "falling_ml": ml(balance.falling),
                 "grown_ml": ml(balance.grown),
                 "dried_ml": ml(balance.dried),
                 "missing": balance.error as f64,

@@ -2,7 +2,7 @@
 
 use super::saved_liquid;
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::geometry::TriMesh;
 use crate::scene::Scene;
 use crate::scene::shallow::inputs::united;
@@ -78,36 +78,20 @@ impl<'a> LiquidState<'a> {
     }
 
     /// Dry ground at a frame, with obstacles; its points are not set.
-    fn dry(ctx: &Context, (scene, of, inputs): Of<'a>, frame: i32, shapes: Vec<Shape>) -> Result<Self> {
+    fn dry(ctx: &Context, (scene, of, inputs): Of<'a>, frame: i32, standing: Vec<Shape>) -> Result<Self> {
         let (ground, solids) = inputs.moved(of, frame)?.unzip();
         let solids = solids.as_ref().unwrap_or(&inputs.solids);
         let points = flow_points::at(of, inputs, ground.as_ref(), frame);
-        let liquid = shallow::Shallow::new(ctx, solids, of.params.clone()).map_err(|error| match error {
-            Error::Argument(what) => Error::file(&scene.path, what),
-            other => other,
-        });
-        let mut liquid = liquid?;
+        let liquid = shallow::Shallow::new(ctx, solids, of.params.clone());
+        let mut liquid = liquid.map_err(|error| error.in_file(&scene.path))?;
         of.carry(scene, &mut liquid)?;
-        let mesh = ground.as_ref().or(inputs.still.as_ref());
-        let stains = of
-            .staining
-            .zip(mesh)
-            .map(|(staining, mesh)| Stains::new(&liquid, &mesh.positions, &mesh.triangles, staining));
+        let stained = of.staining.zip(ground.as_ref().or(inputs.still.as_ref()));
+        let stains = stained.map(|(how, mesh)| Stains::new(&liquid, &mesh.positions, &mesh.triangles, how));
         let stains = stains.transpose()?;
-        let (shapes_before, is_stirred) = (Vec::new(), true);
-        let mut course = Self {
-            scene,
-            of,
-            inputs,
-            liquid,
-            shapes: shapes_before,
-            points,
-            frame,
-            stains,
-            ground,
-            is_stirred,
-        };
-        course.put(shapes)?;
+        let (shapes, is_stirred) = (Vec::new(), true);
+        let mut course =
+            Self { scene, of, inputs, liquid, shapes, points, frame, stains, ground, is_stirred };
+        course.put(standing)?;
         Ok(course)
     }
 
@@ -169,21 +153,21 @@ impl<'a> LiquidState<'a> {
     /// # Errors
     /// None for its own stains.
     pub fn stained(&self) -> Result<Option<(TriMesh, Vec<f32>)>> {
-        let mesh = self.ground.as_ref().or(self.inputs.still.as_ref());
-        let Some((stains, mesh)) = self.stains.as_ref().zip(mesh) else { return Ok(None) };
+        let Some((stains, mesh)) = self.stains.as_ref().zip(self.terrain()) else { return Ok(None) };
         let mut out = vec![0.0; stains.len()];
         stains.stains(&mut out)?;
         Ok(Some((mesh.clone(), out)))
     }
 
+    /// The terrain, if it is a mesh that moves, or one that does not and is needed.
+    fn terrain(&self) -> Option<&TriMesh> {
+        self.ground.as_ref().or(self.inputs.still.as_ref())
+    }
+
     /// The ground as one mesh, with the meshes that stand on it (m); `None` if it is not a mesh.
     pub fn ground(&self) -> Option<TriMesh> {
-        let mut all = self.ground.as_ref().or(self.inputs.still.as_ref())?.clone();
-        for mesh in &self.inputs.meshes {
-            let first = all.positions.len() as u32;
-            all.positions.extend(&mesh.positions);
-            all.triangles.extend(mesh.triangles.iter().map(|corners| corners.map(|corner| corner + first)));
-        }
+        let mut all = self.terrain()?.clone();
+        self.inputs.meshes.iter().for_each(|mesh| all.append(mesh));
         Some(all)
     }
 }

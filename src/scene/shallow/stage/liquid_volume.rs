@@ -10,6 +10,7 @@ use crate::numeric::blocks::{Block, BlockEdit, DIM, Origin, VOXELS, offset, orig
 use crate::scene::Scene;
 use crate::scene::run::Volume;
 use crate::scene::shallow::Shallow;
+use crate::scene::vdb_metadata::metadata;
 use crate::shallow;
 use crate::vdb::file::to_bytes;
 use crate::vdb::write_options::WriteOptions;
@@ -38,18 +39,8 @@ pub(in crate::scene::shallow) fn bytes(
     frame: i32,
     made_from: &str,
 ) -> Result<Vec<u8>> {
-    let fps = scene.shot.fps;
-    let text = |text: &str| MetaValue::Text(text.into());
-    let metadata = vec![
-        ("frazil:frame".into(), MetaValue::Int(frame.into())),
-        ("frazil:fps".into(), MetaValue::Double(fps)),
-        ("frazil:seconds".into(), MetaValue::Double(f64::from(frame) / fps)),
-        ("frazil:units".into(), text("metres")),
-        ("frazil:up".into(), text("y")),
-        ("frazil:version".into(), text(env!("CARGO_PKG_VERSION"))),
-        ("frazil:inputs".into(), text(made_from)),
-        ("volume_m3".into(), MetaValue::Double(liquid.balance().inside)),
-    ];
+    let mut metadata = metadata(scene, frame, made_from);
+    metadata.push(("volume_m3".into(), MetaValue::Double(liquid.balance().inside)));
     let grid = ctx.phase("volume", || density(ctx, liquid, OPAQUE / of.opaque_depth))?;
     to_bytes(&[&grid], &WriteOptions { metadata, ..WriteOptions::default() })
 }

@@ -14,15 +14,13 @@ use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
 use crate::geometry::mesh::attributes::{Number, On};
 use crate::geometry::{MeshArray, TriMesh};
-use crate::io::records::manifest::Keeps;
+use crate::io::mesh;
 use crate::io::usd::materials::Look;
-use crate::io::usd::primvars;
-use crate::io::{mesh, usd};
+use crate::io::usd::{ClipPrims, Clips, MeshPrim, primvars};
 use crate::scene::Scene;
 use crate::scene::run::settings::{first_of, settings_of};
 use crate::scene::run::{
-    CONTENT, Clip, FrameFiles, Kind, MovingMesh, Prims, Reads, Report, Settings, Stage, Stepped, Stepping,
-    Stored, To, Volume,
+    CONTENT, FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
 };
 use crate::shallow;
 use crate::shallow::remap::Moved;
@@ -51,10 +49,8 @@ pub struct State<'a> {
     mesher: Mesher,
 }
 
-/// Input of the writer: the liquid at a frame, if its files are written.
-pub struct Step(Option<Written>);
-
-struct Written {
+/// The liquid at a frame whose files are written.
+pub struct Written {
     drawn: Drawn,
     state: Vec<u8>,
     /// A .vdb file.
@@ -91,6 +87,10 @@ impl<'a> Liquid<'a> {
     }
 
     /// The data that a frame's files are made from.
+    #[cfg_attr(
+        not(feature = "vdb"),
+        expect(unused_variables, reason = "volumes say what they are made from")
+    )]
     fn written(&self, ctx: &Context, state: &mut State<'a>, to: &To<'_>, made_from: &str) -> Result<Written> {
         let State { course, mesher } = state;
         if std::mem::take(&mut course.is_stirred) {
@@ -98,34 +98,15 @@ impl<'a> Liquid<'a> {
         }
         let liquid = &course.liquid;
         let drawn = ctx.phase("surface", || mesher.draw(liquid, self.of.opaque_depth))?;
-        let volume = self.volume(ctx, liquid, to.frame, made_from)?;
+        #[cfg(feature = "vdb")]
+        let volume = match self.of.output.vdb {
+            true => Some(liquid_volume::bytes(ctx, self.scene, self.of, liquid, to.frame, made_from)?),
+            false => None,
+        };
+        #[cfg(not(feature = "vdb"))]
+        let volume = None;
         let state = saved_liquid::save(&course.shapes, &course.points, liquid, course.stains.as_ref());
         Ok(Written { drawn, state, volume, terrain: course.stained()? })
-    }
-
-    #[cfg(feature = "vdb")]
-    fn volume(
-        &self,
-        ctx: &Context,
-        liquid: &shallow::Shallow,
-        frame: i32,
-        made_from: &str,
-    ) -> Result<Option<Vec<u8>>> {
-        if !self.of.output.vdb {
-            return Ok(None);
-        }
-        liquid_volume::bytes(ctx, self.scene, self.of, liquid, frame, made_from).map(Some)
-    }
-
-    #[cfg(not(feature = "vdb"))]
-    fn volume(
-        &self,
-        _ctx: &Context,
-        _liquid: &shallow::Shallow,
-        _frame: i32,
-        _made_from: &str,
-    ) -> Result<Option<Vec<u8>>> {
-        Ok(None)
     }
 
     /// The liquid's material in USD.
@@ -203,10 +184,6 @@ impl Stage for Liquid<'_> {
         Reads { files: files.into_iter().collect(), ahead: Vec::new() }
     }
 
-    fn keeps(&self, _frame: i32) -> Keeps {
-        Keeps::State
-    }
-
     fn volumes(&self) -> Vec<Volume> {
         #[cfg(feature = "vdb")]
         if self.of.output.vdb {
@@ -215,17 +192,17 @@ impl Stage for Liquid<'_> {
         Vec::new()
     }
 
-    fn clip(&self) -> Option<Clip<'_>> {
+    fn clip(&self) -> Option<Clips<'_>> {
         let arrays = Drawn::empty(self.of).arrays(self.of.output);
         let primvars = primvars::primvars(&arrays.iter().collect::<Vec<&MeshArray>>());
-        let mesh = MovingMesh { name: NAME.into(), look: self.look(), uvs: None, primvars };
-        Some(Clip { kind: NAME, manifest: MANIFEST, prims: Prims::Meshes(vec![mesh]) })
+        let mesh = MeshPrim { name: NAME.into(), look: self.look(), moves: true, uvs: None, primvars };
+        Some(Clips::new(NAME, ClipPrims::Meshes(vec![mesh])))
     }
 }
 
 impl<'a> Stepping for Liquid<'a> {
     type State = State<'a>;
-    type Step = Step;
+    type Step = Option<Written>;
     type Writer = ();
 
     fn load(&self, ctx: &Context, done: &Stored, after: Option<i32>) -> Result<State<'a>> {
@@ -244,14 +221,13 @@ impl<'a> Stepping for Liquid<'a> {
         Ok(State { course, mesher: Mesher::default() })
     }
 
-    fn step(&self, ctx: &Context, state: &mut State<'a>, to: &To<'_>) -> Result<Stepped<Step>> {
+    fn step(&self, ctx: &Context, state: &mut State<'a>, to: &To<'_>) -> Result<Stepped<Self::Step>> {
         let ((step, did), phases) = ctx.step(4, || {
             let did = self.go(ctx, &mut state.course, to.frame)?;
-            let written =
-                to.made_from.map(|made_from| self.written(ctx, state, to, made_from)).transpose()?;
-            Ok((Step(written), did))
+            let written = to.made_from.map(|made_from| self.written(ctx, state, to, made_from));
+            Ok((written.transpose()?, did))
         })?;
-        let report = report_of(&state.course, did, step.0.as_ref(), phases)?;
+        let report = report_of(&state.course, did, step.as_ref(), phases)?;
         Ok(Stepped { step, report })
     }
 
@@ -263,8 +239,8 @@ impl<'a> Stepping for Liquid<'a> {
         true
     }
 
-    fn write(&self, _writer: &mut (), step: Step, files: Option<&mut FrameFiles>) -> Result<()> {
-        let (Some(Written { drawn, state, volume, terrain }), Some(files)) = (step.0, files) else {
+    fn write(&self, _writer: &mut (), step: Self::Step, files: Option<&mut FrameFiles>) -> Result<()> {
+        let (Some(Written { drawn, state, volume, terrain }), Some(files)) = (step, files) else {
             return Ok(());
         };
         let output = self.of.output;
@@ -276,16 +252,8 @@ impl<'a> Stepping for Liquid<'a> {
             files.save(NAME, "ply", &mesh::ply_bytes(&drawn.mesh, &carried))?;
         }
         if output.usd {
-            let frame = usd::MeshFrame {
-                name: NAME,
-                points: &drawn.mesh.positions,
-                velocities: &drawn.velocities,
-                triangles: &drawn.mesh.triangles,
-                uvs: None,
-                arrays: &arrays,
-            };
-            let text = usd::clip(NAME, files.frame, self.scene.shot.fps, usd::Units::OWN, &[frame]);
-            files.save(NAME, "usda", text.as_bytes())?;
+            let carried = mesh::Carried { velocities: &drawn.velocities, uvs: None, arrays: &arrays };
+            files.save_clip(NAME, self.scene.shot.fps, &drawn.mesh, &carried)?;
         }
         if let Some(volume) = volume {
             files.save(VOLUME, "vdb", &volume)?;
@@ -313,7 +281,7 @@ fn report_of(
     let deepest = depths.iter().copied().max().unwrap_or(0);
     let mesh = written.map(|written| &written.drawn.mesh);
     let ml = |cubic: f64| cubic / ML;
-    let serde_json::Value::Object(results) = json!({
+    let results = json!({
         "inside_ml": ml(balance.inside),
         "poured_ml": ml(balance.poured),
         "sourced_ml": ml(balance.sourced),
@@ -337,8 +305,6 @@ fn report_of(
         "slowed_rows": report.slowed,
         "vertices": mesh.map_or(0, |mesh| mesh.positions.len()),
         "triangles": mesh.map_or(0, |mesh| mesh.triangles.len()),
-    }) else {
-        unreachable!("it is written as an object")
-    };
-    Ok(Report { results, phases })
+    });
+    Ok(Report::new(results, phases))
 }

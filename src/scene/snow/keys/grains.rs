@@ -1,193 +1,74 @@
 //! The keys of `[grains]`, and the keys of objects that concern grains.
 
 use crate::error::Result;
-use crate::scene::schema::key::{Key, Kind, OBJECT, Scope};
+use crate::scene::schema::key::Kind::{Cells, Choice, File, Flag, Number, Numbers, Whole};
+use crate::scene::schema::key::{Key, Kind, OBJECT, Scope, Unset, optional, or, or_cells};
 use crate::scene::schema::{FAR, Table, Values, rounded};
 use crate::snow::{grain_cohesion, grain_friction};
-
-type Scopes = &'static [(&'static str, Scope)];
-const FIRST: Scopes = &[("grains", Scope::First)];
-const STEP: Scopes = &[("grains", Scope::Step)];
 
 /// Maximum attraction (weights of a grain).
 const MOST_ATTRACTION: f64 = 1000.0;
 
+/// A key that changes the first state.
+const fn first(table: &'static str, name: &'static str, kind: Kind, unset: Unset) -> Key {
+    Key::new(table, name, kind, unset).concerns(&[("grains", Scope::First)])
+}
+
+/// A key that changes every step.
+const fn step(table: &'static str, name: &'static str, kind: Kind, unset: Unset) -> Key {
+    Key::new(table, name, kind, unset).concerns(&[("grains", Scope::Step)])
+}
+
 /// All of them.
 pub const GRAIN_KEYS: &[Key] = &[
-    Key::new(
-        "grains",
-        "preset",
-        Kind::Choice(&["powder", "packed", "wet"]),
-        "kind of snow: sets the defaults of the keys below",
-    )
-    .or_nothing()
-    .such_as("\"powder\"")
-    .concerns(STEP),
-    Key::new("grains", "radius", Kind::Cells(0.02, 0.5), "radius of a grain (m); default: a third of a cell")
-        .or_cells(1.0 / 3.0)
-        .concerns(FIRST),
-    Key::new(
-        "grains",
-        "compression",
-        Kind::Number(0.0, 1.0, ""),
-        "share of the removed snow that is compressed and does not become grains",
-    )
-    .or("0.75")
-    .with_presets(&[("powder", "0.8"), ("packed", "0.5"), ("wet", "0.7")])
-    .concerns(STEP),
-    Key::new(
-        "grains",
-        "repose_angle_deg",
-        Kind::Number(0.0, grain_friction::STEEPEST, "degrees"),
-        "slope at which a poured pile comes to rest",
-    )
-    .or("32.0")
-    .with_presets(&[("powder", "36.0"), ("packed", "38.0"), ("wet", "34.0")])
-    .concerns(STEP),
-    Key::new(
-        "grains",
-        "stands",
-        Kind::Number(0.0, 1000.0, "m"),
-        "height of the tallest wall of grains that stays up (m)",
-    )
-    .or("0.0")
-    .with_presets(&[("packed", "0.1"), ("wet", "0.25")])
-    .concerns(STEP),
-    Key::new(
-        "grains",
-        "friction",
-        Kind::Number(0.0, 1.0, ""),
-        "between grains, instead of repose_angle_deg; grains do not rotate, so low values suffice",
-    )
-    .or_nothing()
-    .such_as("0.2")
-    .concerns(STEP),
-    Key::new(
-        "grains",
-        "attraction",
-        Kind::Number(0.0, MOST_ATTRACTION, "weights of a grain"),
-        "between grains that nearly touch, instead of stands",
-    )
-    .or_nothing()
-    .such_as("4.0")
-    .concerns(STEP),
-    Key::new(
-        "grains",
-        "restitution",
-        Kind::Number(0.0, 1.0, ""),
-        "share of their speed that grains keep when they bounce",
-    )
-    .or("0.0")
-    .concerns(STEP),
-    Key::new(
-        "grains",
-        "air",
-        Kind::Number(0.0, 1.0, ""),
-        "air drag: share of its velocity that a grain keeps over a second",
-    )
-    .or("0.5")
-    .with_presets(&[("powder", "0.3"), ("wet", "0.8")])
-    .concerns(STEP),
-    Key::new(
-        "grains",
-        "air_by_density",
-        Kind::Flag,
-        "whether grains in dense groups feel less air drag than those in thin spray",
-    )
-    .or("false")
-    .concerns(STEP),
-    Key::new("grains", "gravity", Kind::Number(-100.0, 100.0, "m/s2"), "along y (m/s2)")
-        .or("-9.81")
-        .concerns(STEP),
-    Key::new(
-        "grains",
-        "rest",
-        Kind::Flag,
-        "whether grains that lie still come to rest until something wakes them",
-    )
-    .or("true")
-    .concerns(STEP),
-    Key::new(
-        "grains",
-        "active_distance",
-        Kind::Number(1.0e-5, FAR, "m"),
-        "slow grains farther than this (m) from objects and fast grains rest at once; no effect with rest = false",
-    )
-    .or_nothing()
-    .such_as("0.15")
-    .concerns(STEP),
-    Key::new(
-        "grains",
-        "substeps",
-        Kind::Whole(1, 1000),
-        "sub-steps of a frame; default: from size, time and speed",
-    )
-    .or_nothing()
-    .such_as("20")
-    .concerns(STEP),
-    Key::new(
-        "grains",
-        "max",
-        Kind::Whole(1, 60_000_000),
-        "maximum number of grains: a frame that would have more is an error",
-    )
+    step("grains", "preset", Choice(&["powder", "packed", "wet"]), optional("\"powder\""))
+        .means("kind of snow: sets the defaults of the keys below"),
+    first("grains", "radius", Cells(0.02, 0.5), or_cells(1.0 / 3.0))
+        .means("radius of a grain (m); default: a third of a cell"),
+    step("grains", "compression", Number(0.0, 1.0, ""), or("0.75"))
+        .with_presets(&[("powder", "0.8"), ("packed", "0.5"), ("wet", "0.7")])
+        .means("share of the removed snow that is compressed and does not become grains"),
+    step("grains", "repose_angle_deg", Number(0.0, grain_friction::STEEPEST, "degrees"), or("32.0"))
+        .with_presets(&[("powder", "36.0"), ("packed", "38.0"), ("wet", "34.0")])
+        .means("slope at which a poured pile comes to rest"),
+    step("grains", "stands", Number(0.0, 1000.0, "m"), or("0.0"))
+        .with_presets(&[("packed", "0.1"), ("wet", "0.25")])
+        .means("height of the tallest wall of grains that stays up (m)"),
+    step("grains", "friction", Number(0.0, 1.0, ""), optional("0.2"))
+        .means("between grains, instead of repose_angle_deg; grains do not rotate, so low values suffice"),
+    step("grains", "attraction", Number(0.0, MOST_ATTRACTION, "weights of a grain"), optional("4.0"))
+        .means("between grains that nearly touch, instead of stands"),
+    step("grains", "restitution", Number(0.0, 1.0, ""), or("0.0"))
+        .means("share of their speed that grains keep when they bounce"),
+    step("grains", "air", Number(0.0, 1.0, ""), or("0.5"))
+        .with_presets(&[("powder", "0.3"), ("wet", "0.8")])
+        .means("air drag: share of its velocity that a grain keeps over a second"),
+    step("grains", "air_by_density", Flag, or("false"))
+        .means("whether grains in dense groups feel less air drag than those in thin spray"),
+    step("grains", "gravity", Number(-100.0, 100.0, "m/s2"), or("-9.81")).means("along y (m/s2)"),
+    step("grains", "rest", Flag, or("true"))
+        .means("whether grains that lie still come to rest until something wakes them"),
+    step("grains", "active_distance", Number(1.0e-5, FAR, "m"), optional("0.15"))
+        .means("slow grains farther than this (m) from objects and fast grains rest at once; no effect with rest = false"),
+    step("grains", "substeps", Whole(1, 1000), optional("20"))
+        .means("sub-steps of a frame; default: from size, time and speed"),
     // No existing frame depends on it.
-    .or("20000000"),
-    Key::new(
-        "grains",
-        "lifetime",
-        Kind::Number(0.001, 1.0e6, "s"),
-        "age at which a grain is removed (s)",
-    )
-    .or_nothing()
-    .such_as("10.0")
-    .concerns(STEP),
-    Key::new(
-        "grains",
-        "keep_box",
-        Kind::Numbers(6, FAR, "m"),
-        "grains outside this box are removed: x0, y0, z0, x1, y1, z1 (m)",
-    )
-    .or_nothing()
-    .such_as("[-3.0, -1.0, -3.0, 3.0, 3.0, 3.0]")
-    .concerns(STEP),
-    Key::new(
-        "grains",
-        "initial",
-        Kind::File(&["ply", "vdb"]),
-        "points that become grains at the first frame, with their velocities v, if any",
-    )
-    .or_nothing()
-    .such_as("\"drift.ply\"")
-    .concerns(FIRST),
-    Key::new("grains", "seed", Kind::Whole(0, i32::MAX as i64), "another seed scatters new grains differently")
-        .or("0")
-        .concerns(STEP),
-    Key::new(
-        OBJECT,
-        "compression",
-        Kind::Number(0.0, 1.0, ""),
-        "instead of grains.compression, for the snow that it removes",
-    )
-    .or_nothing()
-    .such_as("0.9")
-    .concerns(STEP),
-    Key::new(
-        OBJECT,
-        "stick",
-        Kind::Number(0.0, 1000.0, "weights of a grain"),
-        "attraction between it and the grains that touch it",
-    )
-    .or("0.0")
-    .concerns(STEP),
-    Key::new(
-        OBJECT,
-        "friction",
-        Kind::Number(0.0, 10.0, ""),
-        "between it and grains; loose grains that slide over it while it stands still have the friction between grains",
-    )
-    .or("0.3")
-    .concerns(STEP),
+    Key::new("grains", "max", Whole(1, 60_000_000), or("20000000"))
+        .means("maximum number of grains: a frame that would have more is an error"),
+    step("grains", "lifetime", Number(0.001, 1.0e6, "s"), optional("10.0"))
+        .means("age at which a grain is removed (s)"),
+    step("grains", "keep_box", Numbers(6, FAR, "m"), optional("[-3.0, -1.0, -3.0, 3.0, 3.0, 3.0]"))
+        .means("grains outside this box are removed: x0, y0, z0, x1, y1, z1 (m)"),
+    first("grains", "initial", File(&["ply", "vdb"]), optional("\"drift.ply\""))
+        .means("points that become grains at the first frame, with their velocities v, if any"),
+    step("grains", "seed", Whole(0, i32::MAX as i64), or("0"))
+        .means("another seed scatters new grains differently"),
+    step(OBJECT, "compression", Number(0.0, 1.0, ""), optional("0.9"))
+        .means("instead of grains.compression, for the snow that it removes"),
+    step(OBJECT, "stick", Number(0.0, 1000.0, "weights of a grain"), or("0.0"))
+        .means("attraction between it and the grains that touch it"),
+    step(OBJECT, "friction", Number(0.0, 10.0, ""), or("0.3"))
+        .means("between it and grains; loose grains that slide over it while it stands still have the friction between grains"),
 ];
 
 /// Checks the keys in combination.

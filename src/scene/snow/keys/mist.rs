@@ -1,95 +1,46 @@
 //! The keys of `[mist]`.
 
 use crate::error::{Error, Result};
-use crate::scene::schema::key::{Key, Kind, Scope};
+use crate::scene::schema::key::Kind::{Cells, Flag, Number, NumbersOrFile, Whole};
+use crate::scene::schema::key::{Key, Kind, Scope, Unset, optional, or, or_cells};
 use crate::scene::schema::{Table, Values};
 use crate::scene::snow::has_grains;
 use crate::snow::mist::{FASTEST_WIND, Params};
 
-type Scopes = &'static [(&'static str, Scope)];
-const FIRST: Scopes = &[("mist", Scope::First)];
-const STEP: Scopes = &[("mist", Scope::Step)];
+/// A key that changes the first state.
+const fn first(table: &'static str, name: &'static str, kind: Kind, unset: Unset) -> Key {
+    Key::new(table, name, kind, unset).concerns(&[("mist", Scope::First)])
+}
+
+/// A key that changes every step.
+const fn step(table: &'static str, name: &'static str, kind: Kind, unset: Unset) -> Key {
+    Key::new(table, name, kind, unset).concerns(&[("mist", Scope::Step)])
+}
 
 /// All of them.
 pub const MIST_KEYS: &[Key] = &[
-    Key::new("mist", "cell", Kind::Cells(0.25, 64.0), "edge of a cell of air (m)")
-        .or_cells(4.0 / 3.0)
-        .concerns(FIRST),
-    Key::new(
-        "mist",
-        "from_speed",
-        Kind::Number(0.0, 1000.0, "m/s"),
-        "grains faster than this raise mist along their path (m/s)",
-    )
-    .or("2.0")
-    .concerns(STEP),
-    Key::new("mist", "falling", Kind::Flag, "whether falling grains raise mist too")
-        .or("false")
-        .concerns(STEP),
-    Key::new("mist", "gravity", Kind::Number(-100.0, 100.0, "m/s2"), "of the air where there is mist (m/s2)")
-        .or("-2.0")
-        .concerns(STEP),
-    Key::new(
-        "mist",
-        "half_life",
-        Kind::Number(0.001, 1.0e6, "s"),
-        "time in which half of the mist dissipates (s)",
-    )
-    .or("1.0")
-    .concerns(STEP),
-    Key::new(
-        "mist",
-        "wind",
-        Kind::NumbersOrFile(3, FASTEST_WIND, "m/s", &["vdb"]),
-        "velocity (m/s), or a grid of velocities, that carries the air along where there is mist",
-    )
-    .or("[0.0, 0.0, 0.0]")
-    .concerns(FIRST),
-    Key::new(
-        "mist",
-        "turbulence",
-        Kind::Number(0.0, 1000.0, "m/s2"),
-        "acceleration by eddies (m/s2, root mean square)",
-    )
-    .or("0.0")
-    .concerns(STEP),
-    Key::new(
-        "mist",
-        "turbulence_size",
-        Kind::Cells(2.0, 1.0e6),
-        "size of the eddies (m), at least 8 cells of air; default: 24 cells of air",
-    )
-    .or_nothing()
-    .such_as("0.4")
-    .concerns(STEP),
-    Key::new(
-        "mist",
-        "confinement",
-        Kind::Number(0.0, 100.0, "1/s"),
-        "strength of vorticity confinement, which keeps small eddies alive (1/s); 0 = off",
-    )
-    .or("0.0")
-    .concerns(STEP),
-    Key::new(
-        "mist",
-        "noise",
-        Kind::Number(0.0, 1.0, ""),
-        "maximum share of the density of new mist that noise removes",
-    )
-    .or("0.3")
-    .concerns(STEP),
-    Key::new(
-        "mist",
-        "noise_size",
-        Kind::Cells(0.25, 1.0e6),
-        "size of that noise (m), at least a cell of air; default: 4 cells of air",
-    )
-    .or_nothing()
-    .such_as("0.05")
-    .concerns(STEP),
-    Key::new("mist", "seed", Kind::Whole(0, i32::MAX as i64), "another seed gives other noise and eddies")
-        .or("0")
-        .concerns(STEP),
+    first("mist", "cell", Cells(0.25, 64.0), or_cells(4.0 / 3.0)).means("edge of a cell of air (m)"),
+    step("mist", "from_speed", Number(0.0, 1000.0, "m/s"), or("2.0"))
+        .means("grains faster than this raise mist along their path (m/s)"),
+    step("mist", "falling", Flag, or("false")).means("whether falling grains raise mist too"),
+    step("mist", "gravity", Number(-100.0, 100.0, "m/s2"), or("-2.0"))
+        .means("of the air where there is mist (m/s2)"),
+    step("mist", "half_life", Number(0.001, 1.0e6, "s"), or("1.0"))
+        .means("time in which half of the mist dissipates (s)"),
+    first("mist", "wind", NumbersOrFile(3, FASTEST_WIND, "m/s", &["vdb"]), or("[0.0, 0.0, 0.0]"))
+        .means("velocity (m/s), or a grid of velocities, that carries the air along where there is mist"),
+    step("mist", "turbulence", Number(0.0, 1000.0, "m/s2"), or("0.0"))
+        .means("acceleration by eddies (m/s2, root mean square)"),
+    step("mist", "turbulence_size", Cells(2.0, 1.0e6), optional("0.4"))
+        .means("size of the eddies (m), at least 8 cells of air; default: 24 cells of air"),
+    step("mist", "confinement", Number(0.0, 100.0, "1/s"), or("0.0"))
+        .means("strength of vorticity confinement, which keeps small eddies alive (1/s); 0 = off"),
+    step("mist", "noise", Number(0.0, 1.0, ""), or("0.3"))
+        .means("maximum share of the density of new mist that noise removes"),
+    step("mist", "noise_size", Cells(0.25, 1.0e6), optional("0.05"))
+        .means("size of that noise (m), at least a cell of air; default: 4 cells of air"),
+    step("mist", "seed", Whole(0, i32::MAX as i64), or("0"))
+        .means("another seed gives other noise and eddies"),
 ];
 
 /// Checks the keys in combination.

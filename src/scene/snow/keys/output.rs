@@ -1,94 +1,40 @@
 //! The keys of `[output]` in scenes with snow.
 
-use crate::scene::schema::key::{Key, Kind, Scope};
+use crate::scene::schema::key::Kind::{Choice, Choices, Flag};
+use crate::scene::schema::key::{Key, Kind, Scope, Scopes, Unset, or};
 
-type Scopes = &'static [(&'static str, Scope)];
-const BASE_OUTPUT: Scopes = &[("base", Scope::Output)];
-const VOLUMES_OUTPUT: Scopes = &[("volumes", Scope::Output)];
+const BASE: Scopes = &[("base", Scope::Output)];
+const GRAINS: Scopes = &[("grains", Scope::Output)];
+const MIST: Scopes = &[("mist", Scope::Output)];
+const VOLUMES: Scopes = &[("volumes", Scope::Output)];
+const OBJECTS: Scopes = &[("objects", Scope::Output)];
+
+/// A key that changes the files of a frame.
+const fn output(scopes: Scopes, name: &'static str, kind: Kind, unset: Unset) -> Key {
+    Key::new("output", name, kind, unset).concerns(scopes)
+}
 
 /// All of them.
 pub const OUTPUT_KEYS: &[Key] = &[
-    Key::new(
-        "output",
-        "base",
-        Kind::Choices(&["vdb"]),
-        "base/base.%04d.vdb: surface, compression, touched; [] = none",
-    )
-    .or("[\"vdb\"]")
-    .concerns(BASE_OUTPUT),
-    Key::new(
-        "output",
-        "base_mode",
-        Kind::Choice(&["full", "delta"]),
-        "full, or delta: first frame whole, then only changes (`frazil vdb rebuild`)",
-    )
-    .or("\"full\"")
-    .concerns(BASE_OUTPUT),
-    Key::new("output", "half", Kind::Flag, "16-bit values, for rendering only")
-        .or("false")
-        .concerns(BASE_OUTPUT),
-    Key::new(
-        "output",
-        "removed",
-        Kind::Choices(&["vdb"]),
-        "removed/removed.%04d.vdb: the snow that each frame removed",
-    )
-    .or("[\"vdb\"]")
-    .concerns(BASE_OUTPUT),
-    Key::new(
-        "output",
-        "grains",
-        Kind::Choices(&["vdb", "ply", "usd"]),
-        "grains/grains.%04d.vdb: points with v, id, active, trapped, pscale, source_frame, rest; also \"ply\", \"usd\" (large)",
-    )
-    .or("[\"vdb\"]")
-    .concerns(&[("grains", Scope::Output)]),
-    Key::new(
-        "output",
-        "grains_mode",
-        Kind::Choice(&["full", "delta"]),
-        "full, or delta: .vdb files of the first and every 24th frame whole, then only changes (`frazil vdb rebuild`)",
-    )
-    .or("\"full\"")
-    .concerns(&[("grains", Scope::Output)]),
-    Key::new(
-        "output",
-        "mist",
-        Kind::Choices(&["vdb"]),
-        "mist/mist.%04d.vdb: density, and vel (m/s) at the cells' centres; [] = none",
-    )
-    .or("[\"vdb\"]")
-    .concerns(&[("mist", Scope::Output)]),
-    Key::new(
-        "output",
-        "fog",
-        Kind::Choices(&["base", "grains", "mist"]),
-        "fog/fog.%04d.vdb: densities for rendering, a grid for each of these (see docs/snow.md)",
-    )
-    .or("[]")
-    .concerns(VOLUMES_OUTPUT),
-    Key::new(
-        "output",
-        "snow",
-        Kind::Flag,
-        "snow/snow.%04d.vdb: one level set of the base and the resting grains, on voxels fine enough for the grains (large)",
-    )
-    .or("false")
-    .concerns(VOLUMES_OUTPUT),
-    Key::new(
-        "output",
-        "mesh",
-        Kind::Choices(&["ply", "usd"]),
-        "\"ply\", \"usd\": mesh/, the triangulated surface of the base (large)",
-    )
-    .or("[]")
-    .concerns(VOLUMES_OUTPUT),
-    Key::new(
-        "output",
-        "objects",
-        Kind::Choices(&["usd", "ply"]),
-        "\"usd\", \"ply\": objects/, the moving objects, with velocities",
-    )
-    .or("[]")
-    .concerns(&[("objects", Scope::Output)]),
+    output(BASE, "base", Choices(&["vdb"]), or("[\"vdb\"]"))
+        .means("base/base.%04d.vdb: surface, compression, touched; [] = none"),
+    output(BASE, "base_mode", Choice(&["full", "delta"]), or("\"full\""))
+        .means("full, or delta: first frame whole, then only changes (`frazil vdb rebuild`)"),
+    output(BASE, "half", Flag, or("false")).means("16-bit values, for rendering only"),
+    output(BASE, "removed", Choices(&["vdb"]), or("[\"vdb\"]"))
+        .means("removed/removed.%04d.vdb: the snow that each frame removed"),
+    output(GRAINS, "grains", Choices(&["vdb", "ply", "usd"]), or("[\"vdb\"]"))
+        .means("grains/grains.%04d.vdb: points with v, id, active, trapped, pscale, source_frame, rest; also \"ply\", \"usd\" (large)"),
+    output(GRAINS, "grains_mode", Choice(&["full", "delta"]), or("\"full\""))
+        .means("full, or delta: .vdb files of the first and every 24th frame whole, then only changes (`frazil vdb rebuild`)"),
+    output(MIST, "mist", Choices(&["vdb"]), or("[\"vdb\"]"))
+        .means("mist/mist.%04d.vdb: density, and vel (m/s) at the cells' centres; [] = none"),
+    output(VOLUMES, "fog", Choices(&["base", "grains", "mist"]), or("[]"))
+        .means("fog/fog.%04d.vdb: densities for rendering, a grid for each of these (see docs/snow.md)"),
+    output(VOLUMES, "snow", Flag, or("false"))
+        .means("snow/snow.%04d.vdb: one level set of the base and the resting grains, on voxels fine enough for the grains (large)"),
+    output(VOLUMES, "mesh", Choices(&["ply", "usd"]), or("[]"))
+        .means("\"ply\", \"usd\": mesh/, the triangulated surface of the base (large)"),
+    output(OBJECTS, "objects", Choices(&["usd", "ply"]), or("[]"))
+        .means("\"usd\", \"ply\": objects/, the moving objects, with velocities"),
 ];

@@ -3,82 +3,57 @@
 use super::mist::mist_params;
 use crate::error::Result;
 use crate::io::mesh::{EXTENSIONS, extension};
-use crate::scene::schema::key::{Key, Kind, OBJECT, Scope};
+use crate::scene::schema::key::Kind::{Cells, File, Flag, HeightOrFile, Number, Numbers, Whole};
+use crate::scene::schema::key::{Key, Kind, OBJECT, Scope, Scopes, Unset, optional, or, or_cells, required};
 use crate::scene::schema::{FAR, NO_ORIGIN, ORIGIN, Table, Value, Values};
 use crate::scene::{Ground, Layer, Snow};
 use crate::snow::NoiseParams;
 
-type Scopes = &'static [(&'static str, Scope)];
-const FIRST: Scopes = &[("base", Scope::First)];
 /// Grains fall on the ground too, and mist flows along it.
 const GROUND: Scopes = &[("base", Scope::First), ("grains", Scope::First), ("mist", Scope::First)];
-const STEP: Scopes = &[("base", Scope::Step)];
 
 /// Edges of voxels (m).
 const CELLS: (f64, f64) = (1.0e-5, 10.0);
 /// A mesh of the top, or a level set of the whole layer.
 const TOPS: &[&str] = &["vdb", EXTENSIONS[0], EXTENSIONS[1], EXTENSIONS[2]];
 
+/// A key that changes the first state.
+const fn first(table: &'static str, name: &'static str, kind: Kind, unset: Unset) -> Key {
+    Key::new(table, name, kind, unset).concerns(&[("base", Scope::First)])
+}
+
+/// A key that changes every step.
+const fn step(table: &'static str, name: &'static str, kind: Kind, unset: Unset) -> Key {
+    Key::new(table, name, kind, unset).concerns(&[("base", Scope::Step)])
+}
+
 /// All of them.
 pub const KEYS: &[Key] = &[
-    Key::new(
-        "snow",
-        "ground",
-        Kind::HeightOrFile(FAR, &EXTENSIONS),
-        "height of a level plane (m), or a mesh (then no area); beside a .vdb layer only grains lie on it",
-    )
-    .or_nothing()
-    .begins_with("0.0")
-    .concerns(GROUND),
-    Key::new("snow", "area", Kind::Numbers(4, FAR, "m"), "extent of the plane: x0, z0, x1, z1 (m)")
-        .or_nothing()
-        .begins_with("[-3.0, -3.0, 3.0, 3.0]")
+    Key::new("snow", "ground", HeightOrFile(FAR, &EXTENSIONS), optional("0.0").shown())
+        .means("height of a level plane (m), or a mesh (then no area); beside a .vdb layer only grains lie on it")
         .concerns(GROUND),
-    Key::new("snow", "depth", Kind::Number(1.0e-4, 1000.0, "m"), "depth above ground and static objects (m)")
-        .or_nothing()
-        .begins_with("0.3")
-        .concerns(FIRST),
-    Key::new(
-        "snow",
-        "top",
-        Kind::File(TOPS),
-        "instead of depth: mesh of the top surface, or the layer as a level set",
-    )
-    .or_nothing()
-    .such_as("\"snow_top.ply\"")
-    .concerns(FIRST),
-    Key::new(
-        "snow",
-        "origin",
-        ORIGIN,
-        "position that becomes the origin of the meshes of ground and top (m), subtracted in 64 bits",
-    )
-    .or(NO_ORIGIN)
-    .concerns(GROUND),
-    Key::new("snow", "cell", Kind::Number(CELLS.0, CELLS.1, "m"), "edge of a voxel (m)")
-        .begins_with("0.0075")
-        .concerns(FIRST),
-    Key::new("snow", "min_crumb", Kind::Whole(0, 10_000), "islands of fewer voxels are removed; 0 = off")
-        .or("0")
-        .concerns(STEP),
-    Key::new(
-        "snow.noise",
-        "amplitude",
-        Kind::Cells(0.0, 32.0),
-        "maximum displacement, outward only (m); 0 = off",
-    )
-    .or_cells(2.0)
-    .concerns(STEP),
-    Key::new("snow.noise", "size", Kind::Cells(2.0, 10_000.0), "size of the largest features (m)")
-        .or_cells(8.0)
-        .concerns(STEP),
-    Key::new("snow.noise", "octaves", Kind::Whole(1, 8), "octaves, each half the size of the one before")
-        .or("3")
-        .concerns(STEP),
-    Key::new("snow.noise", "seed", Kind::Whole(0, i32::MAX as i64), "another seed gives another pattern")
-        .or("0")
-        .concerns(STEP),
-    Key::new(OBJECT, "noise", Kind::Flag, "whether its prints have ragged edges").or("true").concerns(STEP),
+    Key::new("snow", "area", Numbers(4, FAR, "m"), optional("[-3.0, -3.0, 3.0, 3.0]").shown())
+        .means("extent of the plane: x0, z0, x1, z1 (m)")
+        .concerns(GROUND),
+    first("snow", "depth", Number(1.0e-4, 1000.0, "m"), optional("0.3").shown())
+        .means("depth above ground and static objects (m)"),
+    first("snow", "top", File(TOPS), optional("\"snow_top.ply\""))
+        .means("instead of depth: mesh of the top surface, or the layer as a level set"),
+    Key::new("snow", "origin", ORIGIN, or(NO_ORIGIN))
+        .means("position that becomes the origin of the meshes of ground and top (m), subtracted in 64 bits")
+        .concerns(GROUND),
+    first("snow", "cell", Number(CELLS.0, CELLS.1, "m"), required("0.0075").shown())
+        .means("edge of a voxel (m)"),
+    step("snow", "min_crumb", Whole(0, 10_000), or("0"))
+        .means("islands of fewer voxels are removed; 0 = off"),
+    step("snow.noise", "amplitude", Cells(0.0, 32.0), or_cells(2.0))
+        .means("maximum displacement, outward only (m); 0 = off"),
+    step("snow.noise", "size", Cells(2.0, 10_000.0), or_cells(8.0)).means("size of the largest features (m)"),
+    step("snow.noise", "octaves", Whole(1, 8), or("3"))
+        .means("octaves, each half the size of the one before"),
+    step("snow.noise", "seed", Whole(0, i32::MAX as i64), or("0"))
+        .means("another seed gives another pattern"),
+    step(OBJECT, "noise", Flag, or("true")).means("whether its prints have ragged edges"),
 ];
 
 impl Snow {

@@ -2,8 +2,7 @@
 
 use serde_json::json;
 
-use super::frames::{grids, metadata};
-use super::settings;
+use super::{frames, settings};
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
 use crate::io::records::manifest::Keeps;
@@ -12,6 +11,7 @@ use crate::scene::run::{
     FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
 };
 use crate::scene::snow::inputs::Inputs;
+use crate::scene::vdb_metadata::metadata;
 use crate::scene::{BaseMode, Scene, moving};
 use crate::snow::base_layer::{BaseLayer, Changes, Grids, Params, StepReport};
 use crate::sweep::{Body, TOLERANCE};
@@ -145,7 +145,7 @@ impl Stepping for Base<'_> {
         })?;
         let mut layer = match after {
             None => BaseLayer::new(ctx, initial, params)?,
-            Some(frame) => BaseLayer::resume(ctx, initial, grids(ctx, done, frame)?, params)?,
+            Some(frame) => BaseLayer::resume(ctx, initial, frames::grids(ctx, done, frame)?, params)?,
         };
         layer.set_min_crumb(self.inputs.snow.min_crumb);
         log::info!(
@@ -167,10 +167,8 @@ impl Stepping for Base<'_> {
         let removing = self.inputs.bodies.iter().zip(moving).filter(|(_, object)| object.role.removes());
         let bodies: Vec<&Body> = removing.map(|(body, _)| body).collect();
         let report = layer.step(ctx, &bodies, time(from), time(frame), frame);
-        let report = report.map_err(|error| match error {
-            Error::Argument(what) => Error::file(&self.scene.path, format!("frame {frame}: {what}")),
-            other => other,
-        })?;
+        let report =
+            report.map_err(|error| error.in_file_at(&self.scene.path, format!("frame {frame}: ")))?;
         log_step(frame, &report);
         let changes = layer.take_changes()?;
         // The whole file at the first frame of a cache of changes needs no copy of the layer.
@@ -224,16 +222,14 @@ fn vdb_bytes(scene: &Scene, frame: i32, grids: &[&FloatGrid], made_from: &str) -
 }
 
 fn report_of(report: StepReport) -> Report {
-    let serde_json::Value::Object(results) = json!({
+    let results = json!({
         "removed_m3": report.removed_volume,
         "base_m3": report.base_volume,
         "touched_blocks": report.touched_blocks,
         "sweep_faces": report.sweep_faces,
         "crumbs": report.crumbs,
-    }) else {
-        unreachable!("it is written as an object")
-    };
-    Report { results, phases: report.phases }
+    });
+    Report::new(results, report.phases)
 }
 
 fn log_step(frame: i32, report: &StepReport) {

@@ -1,11 +1,10 @@
-//! Base layers of frames that are done, and what files say of their frame.
+//! Base layers of frames that are done.
 
 use crate::context::Context;
-use crate::error::{Error, Result};
-use crate::scene::Scene;
+use crate::error::Result;
 use crate::scene::run::Stored;
 use crate::snow::base_layer::Grids;
-use crate::vdb::{MetaValue, file};
+use crate::vdb::file;
 
 /// The layer after a frame: from its own file, or from the last whole one and the changes since.
 ///
@@ -32,29 +31,33 @@ pub(in crate::scene::snow) fn follow(
     grids.apply_delta(ctx, &read_grids(done, frame)?)
 }
 
-pub(in crate::scene::snow::stages) fn read_grids(done: &Stored, frame: i32) -> Result<Grids> {
+fn read_grids(done: &Stored, frame: i32) -> Result<Grids> {
     let path = done.state_file(frame)?;
-    Grids::from_named(file::read_own(&path)?).map_err(|error| match error {
-        Error::Argument(what) => Error::file(path, what),
-        other => other,
-    })
+    Grids::from_named(file::read_own(&path)?).map_err(|error| error.in_file(path))
 }
 
-/// Metadata of every .vdb file of a shot.
-pub(in crate::scene::snow) fn metadata(
-    scene: &Scene,
-    frame: i32,
-    made_from: &str,
-) -> Vec<(String, MetaValue)> {
-    let fps = scene.shot.fps;
-    let text = |text: &str| MetaValue::Text(text.into());
-    vec![
-        ("frazil:frame".into(), MetaValue::Int(frame.into())),
-        ("frazil:fps".into(), MetaValue::Double(fps)),
-        ("frazil:seconds".into(), MetaValue::Double(f64::from(frame) / fps)),
-        ("frazil:units".into(), text("metres")),
-        ("frazil:up".into(), text("y")),
-        ("frazil:version".into(), text(env!("CARGO_PKG_VERSION"))),
-        ("frazil:inputs".into(), text(made_from)),
-    ]
+/// Reads base layers frame by frame, and keeps the last one, so that the next frame reads only its changes.
+#[derive(Default)]
+pub struct LayerReader {
+    /// The layer after a frame.
+    at: Option<(i32, Grids)>,
+}
+
+impl LayerReader {
+    /// The layer after a frame. Frames in ascending order cost one file each; skipped frames that store changes are read too.
+    ///
+    /// # Errors
+    /// As [`grids`].
+    pub fn after(&mut self, ctx: &Context, done: &Stored, frame: i32) -> Result<&Grids> {
+        let follows =
+            |before: i32| before <= frame && (before + 1..=frame).all(|between| done.keeps_changes(between));
+        let layer = match self.at.take() {
+            Some((before, mut layer)) if follows(before) => {
+                (before + 1..=frame).try_for_each(|next| follow(ctx, done, &mut layer, next))?;
+                layer
+            }
+            _ => grids(ctx, done, frame)?,
+        };
+        Ok(&self.at.insert((frame, layer)).1)
+    }
 }

@@ -7,7 +7,6 @@
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-use super::frames;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::points::{Column, Points, Values};
@@ -15,6 +14,7 @@ use crate::io::files::hash::Hasher;
 use crate::io::mesh::extension;
 use crate::scene::Scene;
 use crate::scene::run::{FrameFiles, Stored};
+use crate::scene::vdb_metadata::metadata;
 use crate::vdb::write_options::WriteOptions;
 use crate::vdb::{MetaValue, file, points};
 
@@ -94,7 +94,7 @@ pub(in crate::scene::snow) fn write(
     points: &Points,
     before: Option<&Points>,
 ) -> Result<()> {
-    let mut metadata = frames::metadata(scene, files.frame, files.made_from);
+    let mut metadata = metadata(scene, files.frame, files.made_from);
     let bytes = |points: &Points, metadata| {
         points::to_bytes(ctx, NAME, points, &WriteOptions { metadata, ..WriteOptions::default() })
     };
@@ -375,10 +375,7 @@ impl Whole {
 }
 
 fn wrong(stored: &Stored, frame: i32, error: Error) -> Error {
-    match error {
-        Error::Argument(what) => Error::file(stored.folder(), format!("frame {frame} of grains {what}")),
-        other => other,
-    }
+    error.in_file_at(stored.folder(), format!("frame {frame} of grains "))
 }
 
 /// The points of a frame's file, with its metadata.

@@ -1,28 +1,24 @@
 //! The stage `grains`: snow removed from the base is pushed, piled and thrown.
 
-use std::path::Path;
 use std::sync::OnceLock;
 
 use serde_json::json;
 
-use super::frames;
 use super::grain_files::{self, WHOLE_EVERY, for_clips, ordered};
+use super::{frames, settings};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::{Points, TriMesh};
 use crate::io::particles::ply;
-use crate::io::records::manifest::Keeps;
-use crate::io::usd::points;
-use crate::scene::run::settings::{first_of, settings_of};
-use crate::scene::run::{
-    Clip, FrameFiles, Kind, Prims, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To,
-};
+use crate::io::usd::{ClipPrims, Clips, points};
+use crate::scene::run::settings::first_of;
+use crate::scene::run::{FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To};
 use crate::scene::schema::key::OBJECT;
 use crate::scene::snow::estimate::grains::Forecast;
 use crate::scene::snow::grain_params::params;
 use crate::scene::snow::initial_grains;
 use crate::scene::snow::inputs::Inputs;
-use crate::scene::{self, Role, Scene, moving};
+use crate::scene::{self, Scene, moving};
 use crate::snow::base_layer::Grids;
 use crate::snow::grains::{self, Base, Ground, Object, StepReport, Surroundings};
 use crate::sweep::Body;
@@ -62,9 +58,6 @@ pub struct State {
     /// Whether it was logged that grains fell past the edge of the ground.
     has_told: bool,
 }
-
-/// Input of the writer: the grains after a step, if their files or the changes are written.
-pub struct Step(Option<grains::Grains>);
 
 /// Writes frames.
 pub struct Writer {
@@ -120,9 +113,7 @@ impl<'a> Grains<'a> {
         grains
             .emit(&positions, &velocities, frame)
             .map_err(|error| Error::file(path, format!("as grains: {error}")))?;
-        let results = [("grains", grains.count()), ("left_out", left_out)];
-        let results = results.map(|(name, count)| (name.to_string(), json!(count))).into_iter().collect();
-        Ok(Report { results, ..Report::default() })
+        Ok(Report::new(json!({ "grains": grains.count(), "left_out": left_out }), Vec::new()))
     }
 
     /// Whether the files of a frame contain only changes.
@@ -166,10 +157,7 @@ impl<'a> Grains<'a> {
         };
         let time = |frame: i32| f64::from(frame) / self.scene.shot.fps;
         let step = state.grains.step(ctx, &around, [time(frame - 1), time(frame)], frame);
-        let report = step.map_err(|error| match error {
-            Error::Argument(what) => Error::file(&self.scene.path, format!("grains: {what}")),
-            other => other,
-        })?;
+        let report = step.map_err(|error| error.in_file_at(&self.scene.path, "grains: "))?;
         if report.fell > 0 && !std::mem::replace(&mut state.has_told, true) {
             log::warn!(
                 "frame {frame}: {} grains fell past the edge of the ground to {BELOW} m below it and are dropped, as are all that follow \
@@ -204,18 +192,8 @@ impl Stage for Grains<'_> {
     }
 
     fn settings(&self) -> Result<Settings> {
-        let roles = [&Role::MOVING[..], &[Role::Static]].concat();
-        let mut settings = settings_of(self.scene, self.name(), &self.inputs.seen, &roles)?;
-        let files = self.scene.snow.iter().flat_map(|snow| snow.files());
-        let initial = initial_grains::file(self.scene).map(Path::to_path_buf);
-        let ground = files.filter(|(key, _)| *key == "snow.ground").map(|(key, path)| (key, path.clone()));
-        for (key, path) in ground.chain(initial.map(|path| ("grains.initial", path))) {
-            settings.insert(
-                key.into(),
-                format!("{}{}", crate::scene::run::CONTENT, self.inputs.seen.hash(&path)?),
-            );
-        }
-        Ok(settings)
+        let initial = initial_grains::file(self.scene).map(|path| ("grains.initial", path));
+        settings::of_stage(self.scene, self.name(), &self.inputs.seen, initial)
     }
 
     fn of_first_state(&self, settings: &Settings) -> Settings {
@@ -230,17 +208,13 @@ impl Stage for Grains<'_> {
         Reads { files: moving::files(self.scene, frame), ahead: Vec::new() }
     }
 
-    fn keeps(&self, _frame: i32) -> Keeps {
-        Keeps::State
-    }
-
     fn loose_files(&self) -> &'static [&'static str] {
         if self.scene.output.grains_usd { &[MANIFEST] } else { &[] }
     }
 
-    fn clip(&self) -> Option<Clip<'_>> {
+    fn clip(&self) -> Option<Clips<'_>> {
         let grains = grains::Grains::new(params(self.scene, self.inputs.snow.cell)).ok()?;
-        Some(Clip { kind: "grains", manifest: MANIFEST, prims: Prims::Points(for_clips(grains.points())) })
+        Some(Clips::new("grains", ClipPrims::Points(for_clips(grains.points()))))
     }
 
     fn needs_every_frame(&self) -> Option<&'static str> {
@@ -250,7 +224,8 @@ impl Stage for Grains<'_> {
 
 impl Stepping for Grains<'_> {
     type State = State;
-    type Step = Step;
+    /// The grains after a step, if their files or the changes are written.
+    type Step = Option<grains::Grains>;
     type Writer = Writer;
 
     fn foresee(&self, ctx: &Context, upstream: &[&Stored], last: i32) -> Result<()> {
@@ -274,23 +249,16 @@ impl Stepping for Grains<'_> {
     }
 
     fn load(&self, _ctx: &Context, done: &Stored, after: Option<i32>) -> Result<State> {
+        let params = params(self.scene, self.inputs.snow.cell);
         let grains = match after {
-            None => grains::Grains::new(params(self.scene, self.inputs.snow.cell)),
-            Some(frame) => {
-                let path = done.state_file(frame)?;
-                let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
-                grains::Grains::resume(params(self.scene, self.inputs.snow.cell), &bytes)
-                    .map_err(|error| Error::file(path, error.to_string()))
-            }
+            None => grains::Grains::new(params),
+            Some(frame) => done.resume(frame, |bytes| grains::Grains::resume(params, bytes)),
         };
-        let grains = grains.map_err(|error| match error {
-            Error::Argument(what) => Error::file(&self.scene.path, format!("grains: {what}")),
-            other => other,
-        })?;
+        let grains = grains.map_err(|error| error.in_file_at(&self.scene.path, "grains: "))?;
         Ok(State { grains, layer: None, has_told: false })
     }
 
-    fn step(&self, ctx: &Context, state: &mut State, to: &To<'_>) -> Result<Stepped<Step>> {
+    fn step(&self, ctx: &Context, state: &mut State, to: &To<'_>) -> Result<Stepped<Self::Step>> {
         let [stored] = to.upstream else { return Err(Error::Internal("grains read one stage".into())) };
         let frame = to.frame;
         let is_first = frame == self.scene.shot.frames.first;
@@ -307,7 +275,7 @@ impl Stepping for Grains<'_> {
         };
         state.layer = Some((frame, after));
         let is_wanted = to.made_from.is_some() || self.scene.output.grains_delta;
-        Ok(Stepped { step: Step(is_wanted.then(|| state.grains.clone())), report })
+        Ok(Stepped { step: is_wanted.then(|| state.grains.clone()), report })
     }
 
     fn writer(&self, ctx: &Context, state: &State) -> Result<Writer> {
@@ -315,8 +283,8 @@ impl Stepping for Grains<'_> {
         Ok(Writer { ctx: Context::new(ctx.pool().clone()), before })
     }
 
-    fn write(&self, writer: &mut Writer, step: Step, files: Option<&mut FrameFiles>) -> Result<()> {
-        let Some(grains) = step.0 else { return Ok(()) };
+    fn write(&self, writer: &mut Writer, step: Self::Step, files: Option<&mut FrameFiles>) -> Result<()> {
+        let Some(grains) = step else { return Ok(()) };
         let points = ordered(grains.points());
         if let Some(files) = files {
             let output = self.scene.output;
@@ -342,7 +310,7 @@ impl Stepping for Grains<'_> {
 }
 
 fn report_of(report: &StepReport) -> Report {
-    let serde_json::Value::Object(results) = json!({
+    let results = json!({
         "grains": report.count,
         "born": report.born,
         "resting": report.resting,
@@ -355,8 +323,6 @@ fn report_of(report: &StepReport) -> Report {
         "removed_m3": report.removed_volume,
         "sub_steps": report.sub_steps,
         "fastest_m_per_s": report.fastest,
-    }) else {
-        unreachable!("it is written as an object")
-    };
-    Report { results, phases: report.phases.clone() }
+    });
+    Report::new(results, report.phases.clone())
 }

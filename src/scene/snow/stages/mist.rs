@@ -2,25 +2,25 @@
 
 use serde_json::json;
 
-use super::frames;
+use super::frames::LayerReader;
 use super::grain_files::Whole;
+use super::settings;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::flow::{Solids, Tiles};
 use crate::geometry::points::Values;
 use crate::geometry::{DVec3, Points, TriMesh};
-use crate::io::records::manifest::Keeps;
 use crate::io::usd::{Field, Holds};
 use crate::motion::{Keys, Rigid};
-use crate::scene::run::settings::{first_of, settings_of};
+use crate::scene::run::settings::first_of;
 use crate::scene::run::{
     FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
 };
 use crate::scene::snow::inputs::Inputs;
 use crate::scene::snow::keys::mist::mist_params;
 use crate::scene::snow::wind::wind_file;
-use crate::scene::{Role, Scene, moving};
-use crate::snow::base_layer;
+use crate::scene::vdb_metadata::metadata;
+use crate::scene::{Scene, moving};
 use crate::snow::mist::{self, Around, Grids, Params, Source, Start, StepReport, Surroundings, Wind};
 use crate::sweep::Body;
 use crate::vdb::file::any_to_bytes;
@@ -47,17 +47,8 @@ pub struct State {
     grains: Whole,
     /// Grains' positions and velocities after a frame: the one before the frame being made.
     starts: Option<(i32, Vec<(i64, Start)>)>,
-    /// The base layer after a frame: the one before the frame being made.
-    layer: Option<(i32, base_layer::Grids)>,
-}
-
-/// Input of the writer: the mist after a step, if its files are written.
-pub struct Step(Option<mist::Mist>);
-
-/// Writes frames.
-pub struct Writer {
-    /// Provides the threads. Its cancel flag is ignored: a frame that was begun is finished.
-    ctx: Context,
+    /// The base layer after the frame before the one being made.
+    layer: LayerReader,
 }
 
 /// The density of the mist after a frame.
@@ -80,10 +71,7 @@ impl<'a> Mist<'a> {
 
     /// An error of the mist, with the scene's name.
     fn with_path(&self, error: Error) -> Error {
-        match error {
-            Error::Argument(what) => Error::file(&self.scene.path, format!("mist: {what}")),
-            other => other,
-        }
+        error.in_file_at(&self.scene.path, "mist: ")
     }
 
     /// The grains of a frame that may raise mist.
@@ -117,16 +105,16 @@ impl<'a> Mist<'a> {
         if !raises && state.mist.flow().tiles().active() == 0 {
             return Ok(StepReport::default());
         }
-        // Snow removed in this frame bounds the air until the objects reach it: see `Surroundings`.
-        self.go_to(ctx, state, base, frame - 1)?;
         let State { mist, statics, layer, .. } = state;
+        // Snow removed in this frame bounds the air until the objects reach it: see `Surroundings`.
+        let layer = layer.after(ctx, base, frame - 1)?;
         let moving = self.scene.objects.iter().filter(|object| object.role.moves());
         let pushing = self.inputs.bodies.iter().zip(moving).filter(|(_, object)| object.role.pushes());
         let (moving, removing): (Vec<&Body>, Vec<bool>) =
             pushing.map(|(body, object)| (body, object.role.removes())).unzip();
         let bodies: Vec<&Body> = moving.into_iter().chain(statics.iter()).collect();
         let around = Surroundings {
-            base: layer.as_ref().map(|(_, layer)| &layer.surface),
+            base: Some(&layer.surface),
             bodies: &bodies,
             removing: &removing,
             floor: self.inputs.floor(),
@@ -144,19 +132,6 @@ impl<'a> Mist<'a> {
         let fastest = walls.fastest_near(mist, &sources);
         let around = Around { sources: &sources, boundary: &boundary, fastest, wind: wind.as_ref() };
         mist.step(ctx, &around, times).map_err(|error| self.with_path(error))
-    }
-
-    /// Advances the base layer to a frame.
-    fn go_to(&self, ctx: &Context, state: &mut State, base: &Stored, frame: i32) -> Result<()> {
-        let layer = match state.layer.take() {
-            Some((at, mut layer)) if at == frame - 1 && base.keeps_changes(frame) => {
-                frames::follow(ctx, base, &mut layer, frame)?;
-                layer
-            }
-            _ => frames::grids(ctx, base, frame)?,
-        };
-        state.layer = Some((frame, layer));
-        Ok(())
     }
 }
 
@@ -239,16 +214,8 @@ impl Stage for Mist<'_> {
     }
 
     fn settings(&self) -> Result<Settings> {
-        let roles = [&Role::MOVING[..], &[Role::Static]].concat();
-        let mut settings = settings_of(self.scene, self.name(), &self.inputs.seen, &roles)?;
-        let files = self.scene.snow.iter().flat_map(|snow| snow.files());
-        let ground = files.filter(|(key, _)| *key == "snow.ground").map(|(key, path)| (key, path.clone()));
-        let wind = wind_file(self.scene).map(|path| ("mist.wind", path.to_path_buf()));
-        for (key, path) in ground.chain(wind) {
-            let hash = self.inputs.seen.hash(&path)?;
-            settings.insert(key.into(), format!("{}{hash}", crate::scene::run::CONTENT));
-        }
-        Ok(settings)
+        let wind = wind_file(self.scene).map(|path| ("mist.wind", path));
+        settings::of_stage(self.scene, self.name(), &self.inputs.seen, wind)
     }
 
     fn of_first_state(&self, settings: &Settings) -> Settings {
@@ -268,10 +235,6 @@ impl Stage for Mist<'_> {
         Reads { files: moving::files(self.scene, frame), ahead: Vec::new() }
     }
 
-    fn keeps(&self, _frame: i32) -> Keeps {
-        Keeps::State
-    }
-
     fn volumes(&self) -> Vec<Volume> {
         const FIELDS: &[Field] = &[Field::of(DENSITY, Holds::Density(1.0)), Field::of("vel", Holds::Vector)];
         vec![Volume { kind: NAME, prim: NAME, fields: FIELDS, is_guide: false }]
@@ -280,25 +243,23 @@ impl Stage for Mist<'_> {
 
 impl Stepping for Mist<'_> {
     type State = State;
-    type Step = Step;
-    type Writer = Writer;
+    /// The mist after a step, if its files are written.
+    type Step = Option<mist::Mist>;
+    /// Provides the threads. Its cancel flag is ignored: a frame that was begun is finished.
+    type Writer = Context;
 
     fn load(&self, _ctx: &Context, done: &Stored, after: Option<i32>) -> Result<State> {
         let params = self.params()?;
         let mist = match after {
             None => mist::Mist::new(params).map_err(|error| self.with_path(error))?,
-            Some(frame) => {
-                let path = done.state_file(frame)?;
-                let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
-                mist::Mist::resume(params, &bytes).map_err(|error| Error::file(path, error.to_string()))?
-            }
+            Some(frame) => done.resume(frame, |bytes| mist::Mist::resume(params, bytes))?,
         };
         let statics = self.inputs.statics().iter().chain(self.inputs.ground());
         let statics = statics.filter_map(still).collect::<Result<_>>()?;
-        Ok(State { mist, statics, grains: Whole::default(), starts: None, layer: None })
+        Ok(State { mist, statics, grains: Whole::default(), starts: None, layer: LayerReader::default() })
     }
 
-    fn step(&self, ctx: &Context, state: &mut State, to: &To<'_>) -> Result<Stepped<Step>> {
+    fn step(&self, ctx: &Context, state: &mut State, to: &To<'_>) -> Result<Stepped<Self::Step>> {
         // Before the first frame nothing moves.
         let report = match to.frame == self.scene.shot.frames.first {
             true => StepReport::default(),
@@ -311,18 +272,18 @@ impl Stepping for Mist<'_> {
                 to.frame
             );
         }
-        Ok(Stepped { step: Step(to.made_from.map(|_| state.mist.clone())), report: report_of(&report) })
+        Ok(Stepped { step: to.made_from.map(|_| state.mist.clone()), report: report_of(&report) })
     }
 
-    fn writer(&self, ctx: &Context, _state: &State) -> Result<Writer> {
-        Ok(Writer { ctx: Context::new(ctx.pool().clone()) })
+    fn writer(&self, ctx: &Context, _state: &State) -> Result<Context> {
+        Ok(Context::new(ctx.pool().clone()))
     }
 
-    fn write(&self, writer: &mut Writer, step: Step, files: Option<&mut FrameFiles>) -> Result<()> {
-        let (Some(mist), Some(files)) = (step.0, files) else { return Ok(()) };
+    fn write(&self, ctx: &mut Context, step: Self::Step, files: Option<&mut FrameFiles>) -> Result<()> {
+        let (Some(mist), Some(files)) = (step, files) else { return Ok(()) };
         if self.scene.output.mist {
-            let grids = Grids::of(&writer.ctx, &mist)?;
-            let metadata = frames::metadata(self.scene, files.frame, files.made_from);
+            let grids = Grids::of(ctx, &mist)?;
+            let metadata = metadata(self.scene, files.frame, files.made_from);
             let grids = [GridRef::Floats(&grids.density), GridRef::Vectors(&grids.velocity)];
             let options = WriteOptions { metadata, ..WriteOptions::default() };
             files.save(NAME, "vdb", &any_to_bytes(&grids, &options)?)?;
@@ -332,7 +293,7 @@ impl Stepping for Mist<'_> {
 }
 
 fn report_of(report: &StepReport) -> Report {
-    let serde_json::Value::Object(results) = json!({
+    let results = json!({
         "cells": report.cells,
         "mist_m3": report.mass,
         "sources": report.sources,
@@ -340,8 +301,6 @@ fn report_of(report: &StepReport) -> Report {
         "iterations": report.iterations,
         "divergence": report.divergence,
         "fastest_m_per_s": report.fastest,
-    }) else {
-        unreachable!("it is written as an object")
-    };
-    Report { results, phases: report.phases.clone() }
+    });
+    Report::new(results, report.phases.clone())
 }

@@ -1,11 +1,13 @@
-//! The settings of the base layer.
+//! The settings of stages that depend on files of a scene with snow.
+
+use std::path::Path;
 
 use crate::error::Result;
 use crate::io::records::input_hashes::InputHashes;
-use crate::scene::run::Settings;
-use crate::scene::run::settings::settings_of;
-use crate::scene::schema::key::{Key, Scope};
-use crate::scene::{Layer, Role, Scene, run};
+use crate::scene::run::settings::{first_of, settings_of};
+use crate::scene::run::{CONTENT, Settings};
+use crate::scene::schema::key::Key;
+use crate::scene::{Layer, Role, Scene};
 
 /// The settings that the base depends on. Of the frames only the first counts: a shot may be extended.
 ///
@@ -14,7 +16,7 @@ use crate::scene::{Layer, Role, Scene, run};
 pub(in crate::scene::snow) fn of_base(scene: &Scene, seen: &InputHashes) -> Result<Settings> {
     let mut settings = settings_of(scene, "base", seen, &[Role::Collide, Role::Base, Role::Static])?;
     for (key, path) in scene.snow.iter().flat_map(|snow| snow.files()) {
-        settings.insert(key.into(), format!("{}{}", run::CONTENT, seen.hash(path)?));
+        settings.insert(key.into(), format!("{CONTENT}{}", seen.hash(path)?));
     }
     // A given layer does not depend on what it lies on.
     if scene.snow.as_ref().is_some_and(|snow| matches!(snow.layer, Layer::Grid(_))) {
@@ -23,12 +25,28 @@ pub(in crate::scene::snow) fn of_base(scene: &Scene, seen: &InputHashes) -> Resu
     Ok(settings)
 }
 
+/// The settings of a stage that depends on all objects, on the ground and on a file of its own, given with its key.
+///
+/// # Errors
+/// An input that cannot be read.
+pub(in crate::scene::snow) fn of_stage(
+    scene: &Scene,
+    stage: &str,
+    seen: &InputHashes,
+    own: Option<(&'static str, &Path)>,
+) -> Result<Settings> {
+    let mut settings = settings_of(scene, stage, seen, &[&Role::MOVING[..], &[Role::Static]].concat())?;
+    let files = scene.snow.iter().flat_map(|snow| snow.files()).map(|(key, path)| (key, path.as_path()));
+    for (key, path) in files.filter(|(key, _)| *key == "snow.ground").chain(own) {
+        settings.insert(key.into(), format!("{CONTENT}{}", seen.hash(path)?));
+    }
+    Ok(settings)
+}
+
 /// The settings that determine the layer before the first frame: stored frames cannot continue another layer. Static objects are numbered
 /// separately, as other objects may be added or removed.
 pub(in crate::scene::snow) fn of_layer(keys: &[Key], all: &Settings) -> Settings {
-    let is_first = |key: &str| declared(keys, key).is_some_and(|key| key.scope("base") == Some(Scope::First));
-    let of_snow = all.iter().filter(|(key, _)| is_first(key));
-    let mut out: Settings = of_snow.map(|(key, value)| (key.clone(), value.clone())).collect();
+    let mut out = first_of(keys, all, "base");
     let index = |key: &str| key.strip_prefix("object[")?.strip_suffix("].role")?.parse::<usize>().ok();
     let statics = all.iter().filter(|(_, role)| *role == "\"static\"");
     let mut statics: Vec<usize> = statics.filter_map(|(key, _)| index(key)).collect();
@@ -48,19 +66,12 @@ pub(in crate::scene::snow) fn of_layer(keys: &[Key], all: &Settings) -> Settings
     out
 }
 
-/// The key that a path in settings names: `snow.noise.size`, `object[1].scale`.
-fn declared<'a>(keys: &'a [Key], path: &str) -> Option<&'a Key> {
-    let (table, name) = path.rsplit_once('.')?;
-    let table = table.split('[').next().unwrap_or(table);
-    keys.iter().find(|key| key.table == table && key.name == name)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::scene::System;
+    use crate::scene::run::changed;
     use crate::scene::systems::keys;
-    use run::changed;
 
     fn settings(all: &[(&str, &str)]) -> Settings {
         all.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect()

@@ -2,25 +2,25 @@
 
 use serde_json::{Map, Value, json};
 
+use super::frames::LayerReader;
 use super::grain_files::Whole;
-use super::{frames, mist};
+use super::mist;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::points::Values;
 use crate::geometry::{DVec3, Points, TriMesh};
 use crate::io::mesh;
 use crate::io::records::manifest::Keeps;
-use crate::io::usd::{self, Field, Holds};
+use crate::io::usd::materials::Look;
+use crate::io::usd::{self, ClipPrims, Clips, Field, Holds, MeshPrim};
 use crate::scene::run::settings::settings_of;
-use crate::scene::run::{
-    Clip, FrameFiles, Kind, Prims, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
-};
+use crate::scene::run::{FrameFiles, Kind, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume};
 use crate::scene::snow::Inputs;
 use crate::scene::snow::estimate::memory;
 use crate::scene::snow::grain_params::params;
 use crate::scene::snow::keys::volumes::Needs;
+use crate::scene::vdb_metadata::metadata;
 use crate::scene::{Scene, VolumesOutput};
-use crate::snow::base_layer::Grids;
 use crate::snow::render_volumes::{fog, united};
 use crate::vdb::file::to_bytes;
 use crate::vdb::write_options::WriteOptions;
@@ -37,8 +37,7 @@ pub struct Volumes<'a> {
 /// Kept from frame to frame only to read less.
 #[derive(Default)]
 pub struct State {
-    /// The base after a frame.
-    layer: Option<(i32, Grids)>,
+    layer: LayerReader,
     grains: Whole,
 }
 
@@ -79,14 +78,7 @@ impl<'a> Volumes<'a> {
         let mut source = Source { frame: to.frame, base: None, grains: None, mist: None };
         if self.needs.base {
             let stored = self.stored(to.upstream, "base")?;
-            let grids = match layer.take() {
-                Some((before, mut grids)) if before == to.frame - 1 && stored.keeps_changes(to.frame) => {
-                    frames::follow(ctx, stored, &mut grids, to.frame)?;
-                    grids
-                }
-                _ => frames::grids(ctx, stored, to.frame)?,
-            };
-            source.base = Some(&layer.insert((to.frame, grids)).1.surface);
+            source.base = Some(&layer.after(ctx, stored, to.frame)?.surface);
         }
         if self.needs.grains {
             source.grains = Some(grains.points(ctx, self.stored(to.upstream, "grains")?, to.frame)?.0);
@@ -143,10 +135,8 @@ impl<'a> Volumes<'a> {
         made_from: &str,
     ) -> Result<(Files, Map<String, Value>)> {
         let (mut files, mut results) = (Files::new(), Map::new());
-        let options = WriteOptions {
-            metadata: frames::metadata(self.scene, source.frame, made_from),
-            ..WriteOptions::default()
-        };
+        let metadata = metadata(self.scene, source.frame, made_from);
+        let options = WriteOptions { metadata, ..WriteOptions::default() };
         if self.asked.fog() {
             let grids = ctx.phase("fog", || self.fog(ctx, source))?;
             let voxels: u64 = grids.iter().map(FloatGrid::active_voxels).sum();
@@ -172,19 +162,12 @@ impl<'a> Volumes<'a> {
 
     /// The files of the base's surface.
     fn mesh_files(&self, surface: &TriMesh, frame: i32) -> Files {
-        let mut files = Files::new();
+        let (mut files, carried) = (Files::new(), mesh::Carried::default());
         if self.asked.mesh_ply {
-            files.push(("mesh", "ply", mesh::ply_bytes(surface, &mesh::Carried::default())));
+            files.push(("mesh", "ply", mesh::ply_bytes(surface, &carried)));
         }
         if self.asked.mesh_usd {
-            let mesh = usd::MeshFrame {
-                name: MESH,
-                points: &surface.positions,
-                velocities: &[],
-                triangles: &surface.triangles,
-                uvs: None,
-                arrays: &[],
-            };
+            let mesh = usd::MeshFrame::of(MESH, surface, &carried);
             let text = usd::clip("mesh", frame, self.scene.shot.fps, usd::Units::OWN, &[mesh]);
             files.push(("mesh", "usda", text.into_bytes()));
         }
@@ -227,10 +210,6 @@ impl Stage for Volumes<'_> {
 
     fn settings(&self) -> Result<Settings> {
         settings_of(self.scene, self.name(), &self.inputs.seen, &[])
-    }
-
-    fn of_first_state(&self, _settings: &Settings) -> Settings {
-        Settings::new()
     }
 
     fn upstream(&self) -> &'static [&'static str] {
@@ -284,8 +263,11 @@ impl Stage for Volumes<'_> {
         fog.chain(self.asked.snow.then_some(snow)).collect()
     }
 
-    fn clip(&self) -> Option<Clip<'_>> {
-        self.asked.mesh_usd.then_some(Clip { kind: "mesh", manifest: MANIFEST, prims: Prims::Surface(MESH) })
+    fn clip(&self) -> Option<Clips<'_>> {
+        // A different mesh at each frame, without velocities.
+        let (name, primvars) = (MESH.into(), Vec::new());
+        let mesh = MeshPrim { name, look: Look::Snow, moves: false, uvs: None, primvars };
+        self.asked.mesh_usd.then(|| Clips::new("mesh", ClipPrims::Meshes(vec![mesh])))
     }
 }
 
@@ -318,10 +300,9 @@ impl Stepping for Volumes<'_> {
             let mut source = ctx.phase("read", || self.read(ctx, state, to))?;
             self.make(ctx, &mut source, made_from)
         };
-        let ((step, results), phases) = ctx.step(phases, work).map_err(|error| match error {
-            Error::Argument(what) => Error::file(&self.scene.path, format!("frame {}: {what}", to.frame)),
-            other => other,
-        })?;
+        let made = ctx.step(phases, work);
+        let ((step, results), phases) =
+            made.map_err(|error| error.in_file_at(&self.scene.path, format!("frame {}: ", to.frame)))?;
         Ok(Stepped { step, report: Report { results, phases } })
     }
 

@@ -24,7 +24,7 @@ pub(in crate::scene::surface) fn report_of(
         .map(|apart| json!({ "at_m": <[f64; 3]>::from(apart.position), "volume_m3": apart.volume }))
         .collect();
     let changed = |number: fn(&Change) -> usize| report.change.as_ref().map_or(0, number);
-    let serde_json::Value::Object(mut results) = json!({
+    let results = json!({
         "particles": particles,
         "born": report.born,
         "died": report.died,
@@ -49,12 +49,11 @@ pub(in crate::scene::surface) fn report_of(
         "parts": report.parts,
         "volume_m3": tracker.mesh().volume(),
         "particles_triangles": report.triangles,
-    }) else {
-        unreachable!("it is written as an object")
-    };
+    });
+    let mut out = Report::new(results, report.phases.clone());
     let warnings: Vec<&String> = report.warnings().collect();
     if !warnings.is_empty() {
-        results.insert("warnings".into(), json!(warnings));
+        out.results.insert("warnings".into(), json!(warnings));
     }
-    Report { results, phases: report.phases.clone() }
+    out
 }

@@ -13,19 +13,16 @@ use std::sync::Arc;
 
 use super::{Inputs, Surface};
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::geometry::mesh::attributes::{Number, On};
 use crate::geometry::{DetailedMesh, MeshArray, TriMesh, Vec3};
-use crate::io::records::manifest::Keeps;
 use crate::io::usd::materials::Look;
-use crate::io::usd::primvars;
+use crate::io::usd::{ClipPrims, Clips, MeshPrim, primvars};
 use crate::io::{mesh, usd};
 use crate::mesh_repair::Traced;
 use crate::scene::Scene;
 use crate::scene::run::settings::{first_of, settings_of};
-use crate::scene::run::{
-    CONTENT, Clip, FrameFiles, Kind, MovingMesh, Prims, Reads, Settings, Stage, Stepped, Stepping, Stored, To,
-};
+use crate::scene::run::{CONTENT, FrameFiles, Kind, Reads, Settings, Stage, Stepped, Stepping, Stored, To};
 use tracked_shot::{At, TrackedShot, reads};
 
 /// Name of the stage, and of the kind of its files.
@@ -40,33 +37,16 @@ pub struct Track<'a> {
     inputs: &'a Inputs,
 }
 
-/// Input of the writer: the mesh at a frame, if its files are written.
-pub struct Step(Option<Written>);
-
-struct Written {
-    positions: Vec<Vec3>,
-    triangles: Vec<[u32; 3]>,
+/// The mesh at a frame whose files are written; empty for a frame without particles.
+#[derive(Default)]
+pub struct Written {
+    mesh: TriMesh,
     /// The data that the mesh carries; `None`: those of the first mesh.
     detail: Option<Arc<DetailedMesh>>,
     velocities: Vec<Vec3>,
     delta: Vec<f32>,
     flags: Vec<bool>,
     state: Vec<u8>,
-}
-
-impl Written {
-    /// For a frame without particles.
-    fn nothing(carried: &DetailedMesh, state: Vec<u8>) -> Self {
-        Self {
-            positions: Vec::new(),
-            triangles: Vec::new(),
-            detail: Some(Arc::new(carried.emptied())),
-            velocities: Vec::new(),
-            delta: Vec::new(),
-            flags: Vec::new(),
-            state,
-        }
-    }
 }
 
 impl<'a> Track<'a> {
@@ -152,23 +132,19 @@ impl Stage for Track<'_> {
         reads(self.scene, self.surface, self.inputs, frame)
     }
 
-    fn keeps(&self, _frame: i32) -> Keeps {
-        Keeps::State
-    }
-
-    fn clip(&self) -> Option<Clip<'_>> {
+    fn clip(&self) -> Option<Clips<'_>> {
         let (mesh, of_frame) = (&self.inputs.mesh, self.arrays(&[], &[], Some(0)));
         let arrays: Vec<&MeshArray> = self.carried(mesh).chain(&of_frame).collect();
         let primvars = primvars::primvars(&arrays);
         let uvs = mesh.uvs.as_ref();
-        let meshes = vec![MovingMesh { name: NAME.into(), look: Look::Object, uvs, primvars }];
-        Some(Clip { kind: NAME, manifest: MANIFEST, prims: Prims::Meshes(meshes) })
+        let mesh = MeshPrim { name: NAME.into(), look: Look::Object, moves: true, uvs, primvars };
+        Some(Clips::new(NAME, ClipPrims::Meshes(vec![mesh])))
     }
 }
 
 impl<'a> Stepping for Track<'a> {
     type State = TrackedShot<'a>;
-    type Step = Step;
+    type Step = Option<Written>;
     type Writer = ();
 
     fn load(&self, ctx: &Context, done: &Stored, after: Option<i32>) -> Result<TrackedShot<'a>> {
@@ -176,36 +152,28 @@ impl<'a> Stepping for Track<'a> {
             // A mesh that is not near the particles is refused before anything is written.
             return TrackedShot::begin(ctx, self.scene, self.surface, self.inputs);
         };
-        let path = done.state_file(frame)?;
-        let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
         let params = self.surface.params(self.inputs.spacing);
-        let kept = saved_arrays::resume(params, &self.inputs.mesh, &bytes);
-        let kept = kept.map_err(|error| Error::file(path, error.to_string()))?;
+        let kept = done.resume(frame, |bytes| saved_arrays::resume(params, &self.inputs.mesh, bytes))?;
         TrackedShot::resume(ctx, (self.scene, self.surface, self.inputs), frame, kept)
     }
 
-    fn step(&self, ctx: &Context, walk: &mut TrackedShot<'a>, to: &To<'_>) -> Result<Stepped<Step>> {
+    fn step(&self, ctx: &Context, walk: &mut TrackedShot<'a>, to: &To<'_>) -> Result<Stepped<Self::Step>> {
         walk.go(ctx, to.frame)?;
         let At { tracker, detail, report, source, is_dry, .. } = walk.now();
         let written = || {
             let carried = detail.as_deref().unwrap_or(&self.inputs.mesh);
             let state = saved_arrays::save(tracker, carried, source.sculpted);
             if *is_dry {
-                return Ok(Written::nothing(carried, state));
+                let detail = Some(Arc::new(carried.emptied()));
+                return Ok(Written { detail, state, ..Written::default() });
             }
             let (positions, velocities) = walk.shown(ctx)?;
-            Ok(Written {
-                positions: usd::to_floats(&positions),
-                triangles: tracker.triangles().to_vec(),
-                detail: detail.clone(),
-                velocities,
-                delta: tracker.delta().to_vec(),
-                flags: tracker.flags().to_vec(),
-                state,
-            })
+            let positions = usd::to_floats(&positions);
+            let mesh = TriMesh { positions, triangles: tracker.triangles().to_vec() };
+            let (delta, flags) = (tracker.delta().to_vec(), tracker.flags().to_vec());
+            Ok(Written { mesh, detail: detail.clone(), velocities, delta, flags, state })
         };
-        let step = to.made_from.map(|_| written()).transpose()?;
-        Ok(Stepped { step: Step(step), report: report.clone() })
+        Ok(Stepped { step: to.made_from.map(|_| written()).transpose()?, report: report.clone() })
     }
 
     fn writer(&self, _ctx: &Context, _walk: &TrackedShot<'a>) -> Result<()> {
@@ -216,33 +184,25 @@ impl<'a> Stepping for Track<'a> {
         true
     }
 
-    fn write(&self, _writer: &mut (), step: Step, files: Option<&mut FrameFiles>) -> Result<()> {
-        let (Some(step), Some(files)) = (step.0, files) else { return Ok(()) };
+    fn write(&self, _writer: &mut (), step: Self::Step, files: Option<&mut FrameFiles>) -> Result<()> {
+        let (Some(step), Some(files)) = (step, files) else { return Ok(()) };
         let (output, detail) = (self.surface.output, step.detail.as_deref().unwrap_or(&self.inputs.mesh));
         let has_mask = detail.arrays.iter().any(|array| array.name == Traced::MASK);
-        let unmade = (!has_mask).then_some(step.triangles.len());
+        let unmade = (!has_mask).then_some(step.mesh.triangles.len());
         let of_frame = self.arrays(&step.delta, &step.flags, unmade);
         let arrays: Vec<&MeshArray> = self.carried(detail).chain(&of_frame).collect();
-        let velocities = if output.velocities { &step.velocities[..] } else { &[] };
-        let mesh = TriMesh { positions: step.positions, triangles: step.triangles };
-        let carried = mesh::Carried { velocities, uvs: detail.uvs.as_ref(), arrays: &arrays };
+        let moving =
+            mesh::Carried { velocities: &step.velocities, uvs: detail.uvs.as_ref(), arrays: &arrays };
+        let velocities = if output.velocities { moving.velocities } else { &[] };
+        let carried = mesh::Carried { velocities, ..moving };
         if output.ply {
-            files.save(NAME, "ply", &mesh::ply_bytes(&mesh, &carried))?;
+            files.save(NAME, "ply", &mesh::ply_bytes(&step.mesh, &carried))?;
         }
         if output.obj {
-            files.save(NAME, "obj", &mesh::obj_bytes(&mesh, &carried))?;
+            files.save(NAME, "obj", &mesh::obj_bytes(&step.mesh, &carried))?;
         }
         if output.usd {
-            let frame = usd::MeshFrame {
-                name: NAME,
-                points: &mesh.positions,
-                velocities: &step.velocities,
-                triangles: &mesh.triangles,
-                uvs: detail.uvs.as_ref(),
-                arrays: &arrays,
-            };
-            let text = usd::clip(NAME, files.frame, self.scene.shot.fps, usd::Units::OWN, &[frame]);
-            files.save(NAME, "usda", text.as_bytes())?;
+            files.save_clip(NAME, self.scene.shot.fps, &step.mesh, &moving)?;
         }
         files.save_state(&step.state)
     }

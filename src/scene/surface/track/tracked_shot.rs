@@ -1,6 +1,7 @@
 //! The mesh from frame to frame: it steps with the liquid, keeps its arrays through changes, and is replaced by an edited mesh if there is
 //! one. Some frames are computed ahead, for velocities and for changes that show before they happen.
 
+use std::cmp::Ordering;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -64,6 +65,14 @@ pub struct At {
     pub(in crate::scene::surface) is_dry: bool,
 }
 
+impl At {
+    /// A mesh that no step led to, with the data of the first mesh.
+    fn new(tracker: Tracker, source: Source, report: Report) -> Self {
+        let (way, leads) = (Way::default(), EasingTargets::default());
+        Self { tracker, detail: None, report, way, leads, source, is_dry: false }
+    }
+}
+
 impl<'a> TrackedShot<'a> {
     /// The mesh at the first frame; none if that has no particles.
     ///
@@ -88,23 +97,21 @@ impl<'a> TrackedShot<'a> {
         SavedMesh { mut tracker, detail, sculpted }: SavedMesh,
     ) -> Result<Self> {
         if !tracker.is_rebuilt() {
-            tracker
-                .set_detail_retention(inputs.detail_retention.clone())
-                .map_err(|error| of_first(surface, error))?;
+            let kept = tracker.set_detail_retention(inputs.detail_retention.clone());
+            kept.map_err(|error| of_first(surface, error))?;
         }
         let detail = detail.map(|detail| {
             let triangles = tracker.triangles().to_vec();
             Arc::new(DetailedMesh { mesh: TriMesh { positions: Vec::new(), triangles }, ..detail })
         });
         let source = Source::of(ctx, surface.rebuild, None, inputs.mesh.clone(), &inputs.particles);
-        let (report, way, leads) = (nothing_told(), Way::default(), EasingTargets::default());
         // Nothing of this frame is written again.
-        let at = At { tracker, detail, report, way, leads, source, is_dry: false };
+        let at = At { detail, ..At::new(tracker, source, Report::default()) };
         let mut walk = Self::at(of, frame, at);
         if let Some(sculpted) = sculpted {
             let source = match read_sculpt(ctx, surface, inputs, sculpted)? {
                 Some(sculpt) => {
-                    let particles = walk.particles(sculpted)?;
+                    let particles = walk.liquid.at(surface.time(walk.scene.shot.frames, sculpted))?;
                     Source::of(ctx, surface.rebuild, Some(sculpted), Arc::new(sculpt.mesh), &particles)
                 }
                 None => {
@@ -120,17 +127,8 @@ impl<'a> TrackedShot<'a> {
     }
 
     fn at((scene, surface, inputs): (&'a Scene, &'a Surface, &'a Inputs), frame: i32, at: At) -> Self {
-        let liquid = Liquid::new(surface, scene.shot, &inputs.seen);
-        Self {
-            scene,
-            surface,
-            inputs,
-            liquid,
-            frame,
-            known: VecDeque::from([at]),
-            end: None,
-            has_warned: false,
-        }
+        let (liquid, known) = (Liquid::new(surface, scene.shot, &inputs.seen), VecDeque::from([at]));
+        Self { scene, surface, inputs, liquid, frame, known, end: None, has_warned: false }
     }
 
     /// Advances to a frame, and computes as far ahead as that needs.
@@ -213,97 +211,86 @@ impl<'a> TrackedShot<'a> {
         if self.end.is_some_and(|end| frame >= end) {
             return Ok(None);
         }
-        if frame <= last {
-            return match self.next(ctx, frame) {
-                // The error ends the shot only when the frame is due: the frames before it exist and are written first.
-                Err(error) if !matches!(error, Error::Cancelled) => {
-                    self.end = Some(frame);
-                    Ok(None)
-                }
-                next => next.map(Some),
-            };
-        }
-        let files = self.surface.between(self.scene.shot.frames, frame - 1, frame);
-        if !self.surface.reads_ahead() || !files.iter().all(|path| path.is_file()) {
-            return Ok(None);
-        }
-        match self.next(ctx, frame) {
-            Err(error) if !matches!(error, Error::Cancelled) => {
-                let what = match frame - last {
-                    1 => format!("frame {last} has the velocities of the frame before"),
-                    _ => format!("changes from frame {frame} on are not eased in"),
-                };
-                log::warn!("{error}; {what}");
-                self.end = Some(frame);
-                Ok(None)
+        if frame > last {
+            let files = self.surface.between(self.scene.shot.frames, frame - 1, frame);
+            if !self.surface.reads_ahead() || !files.iter().all(|path| path.is_file()) {
+                return Ok(None);
             }
-            next => next.map(Some),
         }
+        let error = match self.next(ctx, frame) {
+            Err(error) if !matches!(error, Error::Cancelled) => error,
+            next => return next.map(Some),
+        };
+        self.end = Some(frame);
+        // Within the shot the error counts only when the frame is due: the frames before it exist and are written first.
+        match frame - last {
+            ..=0 => {}
+            1 => log::warn!("{error}; frame {last} has the velocities of the frame before"),
+            _ => log::warn!("{error}; changes from frame {frame} on are not eased in"),
+        }
+        Ok(None)
     }
 
     /// The mesh at a frame, from the last known one, which is the previous frame.
     fn next(&mut self, ctx: &Context, frame: i32) -> Result<At> {
-        if frame < self.inputs.begins {
-            return without_mesh(self.surface, self.inputs);
+        match frame.cmp(&self.inputs.begins) {
+            Ordering::Less => without_mesh(self.surface, self.inputs),
+            Ordering::Equal => self.appear(ctx, frame),
+            Ordering::Greater => self.follow(ctx, frame),
         }
-        if frame == self.inputs.begins {
-            let mut at = first_mesh(ctx, self.surface, self.inputs)?;
-            at.leads = EasingTargets::cut(at.tracker.vertices().len());
-            let particles = Arc::new(self.inputs.particles.clone());
-            let sculpted = self.resculpt(ctx, &mut at, frame, &particles)?;
-            if let Some(report) = sculpted {
-                at.report = report_of(&report, particles.positions.len(), &at.tracker, true);
-            }
-            return Ok(at);
+    }
+
+    /// The mesh at the first frame that has particles, after frames without.
+    fn appear(&self, ctx: &Context, frame: i32) -> Result<At> {
+        let mut at = first_mesh(ctx, self.surface, self.inputs)?;
+        at.leads = EasingTargets::cut(at.tracker.vertices().len());
+        let particles = &self.inputs.particles;
+        if let Some(report) = self.resculpt(ctx, &mut at, frame, particles)? {
+            at.report = report_of(&report, particles.positions.len(), &at.tracker, true);
         }
+        Ok(at)
+    }
+
+    /// The mesh at a frame, carried along by the particles.
+    fn follow(&mut self, ctx: &Context, frame: i32) -> Result<At> {
         let phases = ctx.collect();
         let last = self.known.len() - 1;
         let before = &mut self.known[last];
-        let (mut tracker, mut detail, source) =
-            (before.tracker.clone(), before.detail.clone(), before.source.clone());
+        let begin = At::new(before.tracker.clone(), before.source.clone(), Report::default());
+        let mut at = At { detail: before.detail.clone(), ..begin };
         // The surface that was made ahead belongs to the next one.
         before.tracker.forget_ahead();
-        let mut trail = Trail::of(tracker.vertices());
-        let way = self.liquid.way(frame);
-        let (mut report, mut leads) = (StepReport::default(), EasingTargets::default());
-        let mut from = self.liquid.at(way[0])?;
+        let mut trail = Trail::of(at.tracker.vertices());
+        let times = self.liquid.way(frame);
+        let mut report = StepReport::default();
+        let mut from = self.liquid.at(times[0])?;
         // The end of each following step; beyond the shot it need not exist.
         let beyond = self.liquid.way(frame + 1)[1];
         let is_there = self.surface.rebuild && frame < self.scene.shot.frames.last;
-        let behind = way[2..].iter().copied().map(Some).chain([is_there.then_some(beyond)]);
-        for (ends, behind) in way.windows(2).zip(behind) {
+        let behind = times[2..].iter().copied().map(Some).chain([is_there.then_some(beyond)]);
+        for (ends, behind) in times.windows(2).zip(behind) {
             let to = self.liquid.at(ends[1])?;
             let dt = (ends[1] - ends[0]) * self.liquid.file_time();
-            if let Some(behind) = behind
-                && let Ok(particles) = self.liquid.at(behind)
-            {
-                tracker.set_ahead(particles);
+            if let Some(Ok(particles)) = behind.map(|behind| self.liquid.at(behind)) {
+                at.tracker.set_ahead(particles);
             }
-            let triangles = self.surface.eases().then(|| tracker.triangles().to_vec());
-            let step =
-                tracker.step(ctx, &from, &to, dt).map_err(|error| self.liquid.with_path(ends[0], error))?;
-            let share = (ends[1] - way[0]) / (way[way.len() - 1] - way[0]);
+            let triangles = self.surface.eases().then(|| at.tracker.triangles().to_vec());
+            let step = at.tracker.step(ctx, &from, &to, dt);
+            let step = step.map_err(|error| self.liquid.with_path(ends[0], error))?;
+            let share = (ends[1] - times[0]) / (times[times.len() - 1] - times[0]);
             match &step.change {
                 Some(change) => {
                     trail.follow(&change.before, share);
-                    if let Some(triangles) = triangles {
-                        leads = leads.then(&EasingTargets::of(ctx, change, &triangles, self.inputs.spacing)?);
-                    }
-                    let own = detail.as_deref().unwrap_or(&self.inputs.mesh);
-                    detail = Some(Arc::new(match tracker.vertices() {
-                        [] => own.emptied(),
-                        _ => carried(ctx, own, &source, (&tracker, change), &to)?,
-                    }));
+                    self.carry(ctx, &mut at, change, triangles, &to)?;
                     trail.change(change);
                 }
-                None => trail.follow(tracker.vertices(), share),
+                None => trail.follow(at.tracker.vertices(), share),
             }
             report = report.followed_by(step);
             from = to;
         }
-        let way = trail.way(tracker.vertices(), tracker.triangles(), self.scene.shot.fps);
-        let is_dry = from.positions.is_empty();
-        let mut at = At { tracker, detail, report: nothing_told(), way, leads, source, is_dry };
+        at.way = trail.way(at.tracker.vertices(), at.tracker.triangles(), self.scene.shot.fps);
+        at.is_dry = from.positions.is_empty();
         let sculpted = self.resculpt(ctx, &mut at, frame, &from)?;
         let is_resculpted = sculpted.is_some();
         let report = sculpted.into_iter().fold(report, StepReport::followed_by);
@@ -311,6 +298,27 @@ impl<'a> TrackedShot<'a> {
         report.new_warnings(&mut self.has_warned).for_each(|warning| log::warn!("frame {frame}: {warning}"));
         at.report = report_of(&report, from.positions.len(), &at.tracker, is_resculpted);
         Ok(at)
+    }
+
+    /// Takes what a mesh carries, and what eases its coming changes, through a change; `triangles` are those before it, if it is eased.
+    fn carry(
+        &self,
+        ctx: &Context,
+        at: &mut At,
+        change: &Change,
+        triangles: Option<Vec<[u32; 3]>>,
+        particles: &Particles,
+    ) -> Result<()> {
+        if let Some(triangles) = triangles {
+            let targets = EasingTargets::of(ctx, change, &triangles, self.inputs.spacing)?;
+            at.leads = std::mem::take(&mut at.leads).then(&targets);
+        }
+        let own = at.detail.as_deref().unwrap_or(&self.inputs.mesh);
+        at.detail = Some(Arc::new(match at.tracker.vertices() {
+            [] => own.emptied(),
+            _ => carried(ctx, own, &at.source, (&at.tracker, change), particles)?,
+        }));
+        Ok(())
     }
 
     /// Replaces the mesh by the edited mesh of the frame, if there is one; returns the report.
@@ -326,16 +334,10 @@ impl<'a> TrackedShot<'a> {
             log::warn!("{}: is left out, as frame {frame} has no particles", sculpt.path.display());
             return Ok(None);
         }
-        let refused = |error| match error {
-            Error::Argument(what) => Error::file(&sculpt.path, what),
-            other => other,
-        };
         let old = ctx.pool().install(|| NearestTree::new(&at.tracker.mesh()));
         let triangles = at.tracker.triangles().to_vec();
-        let report = at
-            .tracker
-            .resculpt(ctx, &sculpt.mesh.mesh, sculpt.detail_retention, particles)
-            .map_err(refused)?;
+        let report = at.tracker.resculpt(ctx, &sculpt.mesh.mesh, sculpt.detail_retention, particles);
+        let report = report.map_err(|error| error.in_file(&sculpt.path))?;
         // Vertices of the edited mesh move like those of the previous mesh near them.
         let velocity = |position: &DVec3| {
             let corner = old.nearest(*position).map(|near| triangles[near.triangle][0] as usize);
@@ -348,11 +350,6 @@ impl<'a> TrackedShot<'a> {
         at.detail = Some(mesh);
         Ok(Some(report))
     }
-
-    /// The particles at a frame.
-    fn particles(&mut self, frame: i32) -> Result<Arc<Particles>> {
-        self.liquid.at(self.surface.time(self.scene.shot.frames, frame))
-    }
 }
 
 /// The mesh at the first frame that has particles.
@@ -360,14 +357,12 @@ fn first_mesh(ctx: &Context, surface: &Surface, inputs: &Inputs) -> Result<At> {
     let params = surface.params(inputs.spacing);
     let begun = ctx.step(4, || Tracker::begin(ctx, params, &inputs.mesh.mesh, &inputs.particles));
     let ((mut tracker, report), phases) = begun.map_err(|error| of_first(surface, error))?;
-    tracker
-        .set_detail_retention(inputs.detail_retention.clone())
-        .map_err(|error| of_first(surface, error))?;
+    let kept = tracker.set_detail_retention(inputs.detail_retention.clone());
+    kept.map_err(|error| of_first(surface, error))?;
     let report = StepReport { phases, ..report };
     let report = report_of(&report, inputs.particles.positions.len(), &tracker, false);
     let source = Source::of(ctx, surface.rebuild, None, inputs.mesh.clone(), &inputs.particles);
-    let (way, leads) = (Way::default(), EasingTargets::default());
-    Ok(At { tracker, detail: None, report, way, leads, source, is_dry: false })
+    Ok(At::new(tracker, source, report))
 }
 
 /// A frame before the first particles.
@@ -375,23 +370,14 @@ fn without_mesh(surface: &Surface, inputs: &Inputs) -> Result<At> {
     let tracker = Tracker::without_mesh(surface.params(inputs.spacing))?;
     let report = report_of(&StepReport::default(), 0, &tracker, false);
     let source = Source { sculpted: None, mesh: inputs.mesh.clone(), rest: None };
-    let (way, leads) = (Way::default(), EasingTargets::default());
     let detail = Some(Arc::new(inputs.mesh.emptied()));
-    Ok(At { tracker, detail, report, way, leads, source, is_dry: true })
+    Ok(At { detail, is_dry: true, ..At::new(tracker, source, report) })
 }
 
 /// An error of the first mesh, with its file.
 fn of_first(surface: &Surface, error: Error) -> Error {
-    match error {
-        Error::Argument(what) if what.starts_with(TOO_FAR) => Error::file(&surface.particles, what),
-        Error::Argument(what) => Error::file(surface.mesh.as_ref().unwrap_or(&surface.particles), what),
-        other => other,
-    }
-}
-
-/// The report before any step.
-fn nothing_told() -> Report {
-    Report { results: serde_json::Map::new(), phases: Vec::new() }
+    let is_far = matches!(&error, Error::Argument(what) if what.starts_with(TOO_FAR));
+    error.in_file(surface.mesh.as_ref().filter(|_| !is_far).unwrap_or(&surface.particles))
 }
 
 impl Source {

@@ -119,17 +119,12 @@ pub fn side<const FULL: bool, const ROOFED: bool>(
 /// Stands in for absent columns.
 const ABSENT: [i32; STRIP] = [0; STRIP];
 
-/// A strip beyond a side.
-struct Beyond<'a> {
-    base: &'a [i32; STRIP],
-    ceiling: &'a [i32; STRIP],
-    depth: &'a [i32; STRIP],
-}
+/// Base, ceiling and depth of the columns of a strip.
+type Strip<'a> = [&'a [i32; STRIP]; 3];
 
 /// Finds the surroundings of the columns of strips; `out` begins at strip `first`. For pipes to the east: the sum of contact and walls over
 /// both sides (units), the contact before them and the contact behind; then the same for pipes to the south.
-pub fn find(step: &Step, around: &Around, strips: &[u32], first: usize, out: [&mut [f32]; 6]) {
-    let mut out = out;
+pub fn find(step: &Step, around: &Around, strips: &[u32], first: usize, mut out: [&mut [f32]; 6]) {
     let out = &mut out;
     dispatch!(find_strips(step: &Step, around: &Around, strips: &[u32], first: usize, out: &mut [&mut [f32]; 6]))
 }
@@ -148,8 +143,8 @@ fn find_strips(step: &Step, around: &Around, strips: &[u32], first: usize, out: 
             (strip_mut(all_z, position), strip_mut(before_z, position), strip_mut(behind_z, position));
         both(
             step,
-            &own,
-            [&around.beyond(north), &around.beyond(south)],
+            own,
+            [around.beyond(north), around.beyond(south)],
             [links[3], links[1]],
             is_roofed,
             numbers,
@@ -157,10 +152,10 @@ fn find_strips(step: &Step, around: &Around, strips: &[u32], first: usize, out: 
         let (has_west, has_east) = (columns.west(strip).is_some(), columns.east(strip).is_some());
         let (mut west, mut east) = (around.shifted(strip, has_west, 1), around.shifted(strip, has_east, 0));
         if !has_west {
-            west.shut(0);
+            west.iter_mut().for_each(|numbers| numbers[0] = 0);
         }
         if !has_east {
-            east.shut(STRIP - 1);
+            east.iter_mut().for_each(|numbers| numbers[STRIP - 1] = 0);
         }
         let is_roofed = roofed[strip]
             || !has_west
@@ -169,66 +164,39 @@ fn find_strips(step: &Step, around: &Around, strips: &[u32], first: usize, out: 
             || roofed[strip + usize::from(has_east)];
         let numbers =
             (strip_mut(all_x, position), strip_mut(before_x, position), strip_mut(behind_x, position));
-        both(step, &own, [&west.see(), &east.see()], [links[2], links[0]], is_roofed, numbers);
+        both(step, own, [west.each_ref(), east.each_ref()], [links[2], links[0]], is_roofed, numbers);
     }
 }
 
 impl<'a> Around<'a> {
+    /// Bases, ceilings and depths of all columns.
     #[inline(always)]
-    fn strip(&self, strip: usize) -> Beyond<'a> {
-        Beyond {
-            base: strip_of(self.columns.bases(), strip),
-            ceiling: strip_of(self.columns.ceilings(), strip),
-            depth: strip_of(self.depth, strip),
-        }
+    fn numbers(&self) -> [&'a [i32]; 3] {
+        [self.columns.bases(), self.columns.ceilings(), self.depth]
     }
 
     #[inline(always)]
-    fn beyond(&self, strip: u32) -> Beyond<'a> {
-        match strip {
-            NONE => Beyond { base: &ABSENT, ceiling: &ABSENT, depth: &ABSENT },
-            strip => self.strip(strip as usize),
-        }
+    fn strip(&self, strip: usize) -> Strip<'a> {
+        self.numbers().map(|numbers| strip_of(numbers, strip))
+    }
+
+    #[inline(always)]
+    fn beyond(&self, strip: u32) -> Strip<'a> {
+        if strip == NONE { [&ABSENT; 3] } else { self.strip(strip as usize) }
     }
 
     /// The columns one position before those of a strip (`before` 1), or behind them (0).
     #[inline(always)]
-    fn shifted(&self, strip: usize, is_there: bool, before: usize) -> Shifted {
+    fn shifted(&self, strip: usize, is_there: bool, before: usize) -> [[i32; STRIP]; 3] {
         let at = (strip * STRIP + 1).wrapping_sub(2 * before);
         if is_there || before == 0 {
-            Shifted {
-                base: *strip_from(self.columns.bases(), at),
-                ceiling: *strip_from(self.columns.ceilings(), at),
-                depth: *strip_from(self.depth, at),
-            }
-        } else {
-            let own = self.strip(strip);
-            let mut west = Shifted { base: ABSENT, ceiling: ABSENT, depth: ABSENT };
-            west.base[1..].copy_from_slice(&own.base[..STRIP - 1]);
-            west.ceiling[1..].copy_from_slice(&own.ceiling[..STRIP - 1]);
-            west.depth[1..].copy_from_slice(&own.depth[..STRIP - 1]);
-            west
+            return self.numbers().map(|numbers| *strip_from(numbers, at));
         }
-    }
-}
-
-/// Columns beside those of a strip.
-struct Shifted {
-    base: [i32; STRIP],
-    ceiling: [i32; STRIP],
-    depth: [i32; STRIP],
-}
-
-impl Shifted {
-    /// Clears the column at a position.
-    #[inline(always)]
-    fn shut(&mut self, position: usize) {
-        (self.base[position], self.ceiling[position], self.depth[position]) = (0, 0, 0);
-    }
-
-    #[inline(always)]
-    fn see(&self) -> Beyond<'_> {
-        Beyond { base: &self.base, ceiling: &self.ceiling, depth: &self.depth }
+        self.strip(strip).map(|own| {
+            let mut west = ABSENT;
+            west[1..].copy_from_slice(&own[..STRIP - 1]);
+            west
+        })
     }
 }
 
@@ -237,7 +205,7 @@ type Found<'a> = (&'a mut [f32; STRIP], &'a mut [f32; STRIP], &'a mut [f32; STRI
 
 /// Both sides of a strip across one axis.
 #[inline(always)]
-fn both(step: &Step, own: &Beyond, sides: [&Beyond; 2], links: [u16; 2], is_roofed: bool, found: Found) {
+fn both(step: &Step, own: Strip, sides: [Strip; 2], links: [u16; 2], is_roofed: bool, found: Found) {
     if is_roofed {
         both_strips::<true>(step, own, sides, links, found);
     } else {
@@ -248,28 +216,26 @@ fn both(step: &Step, own: &Beyond, sides: [&Beyond; 2], links: [u16; 2], is_roof
 #[inline(always)]
 fn both_strips<const ROOFED: bool>(
     step: &Step,
-    own: &Beyond,
-    [first, second]: [&Beyond; 2],
+    own: Strip,
+    [first, second]: [Strip; 2],
     links: [u16; 2],
     (all, before, behind): Found,
 ) {
     for x in 0..STRIP {
-        let high = own.depth[x] as f32;
+        let high = own[2][x] as f32;
         let inverse = 1.0 / max(high, 1.0);
-        let room = own.room(x);
+        let column = room(own, x);
         let is_linked = [links[0] >> x & 1 == 1, links[1] >> x & 1 == 1];
-        let [one, part] = side::<false, ROOFED>(step, room, inverse, first.room(x), is_linked[0]);
-        let [two, other_part] = side::<false, ROOFED>(step, room, inverse, second.room(x), is_linked[1]);
+        let [one, part] = side::<false, ROOFED>(step, column, inverse, room(first, x), is_linked[0]);
+        let [two, other_part] = side::<false, ROOFED>(step, column, inverse, room(second, x), is_linked[1]);
         all[x] = (one + two) + walls::<false>(step, high, inverse, [part, other_part]);
         (before[x], behind[x]) = (one, two);
     }
 }
 
-impl Beyond<'_> {
-    #[inline(always)]
-    fn room(&self, x: usize) -> Room {
-        Room { base: self.base[x], ceiling: self.ceiling[x], depth: self.depth[x] }
-    }
+#[inline(always)]
+fn room([base, ceiling, depth]: Strip, x: usize) -> Room {
+    Room { base: base[x], ceiling: ceiling[x], depth: depth[x] }
 }
 
 #[cfg(test)]

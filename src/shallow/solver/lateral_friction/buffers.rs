@@ -1,5 +1,6 @@
 //! What lateral friction keeps from step to step.
 
+use crate::numeric::lists::reset;
 use crate::shallow::columns::STRIP;
 
 /// Lateral friction of pipes.
@@ -49,8 +50,7 @@ pub(super) struct Numbers {
 impl Numbers {
     pub fn fit(&mut self, position: usize, len: usize) {
         self.before = STRIP + 48 * position;
-        self.list.clear();
-        self.list.resize(self.before + len + 2 * STRIP, 0.0);
+        reset(&mut self.list, self.before + len + 2 * STRIP, 0.0);
     }
 
     /// The numbers from the first column on.

@@ -3,7 +3,9 @@
 
 use super::Walls;
 use super::beside::{self, Room};
-use crate::shallow::columns::{Columns, NONE, STRIP};
+use crate::shallow::columns::{Columns, STRIP};
+use crate::shallow::pipes::cliffs;
+use crate::shallow::pipes::side::Side;
 use crate::shallow::solver::pressurised::edges::At;
 use crate::shallow::solver::pressurised::network::State;
 use crate::shallow::solver::viscous_flux::{Step, min};
@@ -44,10 +46,9 @@ impl Walls {
         let ends = if j < columns.len() { 2 } else { 1 };
         let of = |is_full: bool| if is_full { CEILING } else { 1.0 };
         let ground = if ends == 2 { 0.5 * (of(full[0]) + of(full[1])) } else { of(full[0]) };
-        // Sides across the pipe, as bits of links.
         let (axis, sides) = match at {
-            At::East(_) => (0, [3, 1]),
-            At::South(_) => (1, [2, 0]),
+            At::East(_) => (0, [Side::North, Side::South]),
+            At::South(_) => (1, [Side::West, Side::East]),
             At::Link(_) => return Beside { ground, ..Beside::NONE },
         };
         let rooms = rooms(columns, state, [i, j]);
@@ -57,8 +58,11 @@ impl Walls {
         let of_end = |end: usize| {
             let column = [i, j][end];
             let beyond = sides.map(|side| {
-                let is_linked = self.linked[column / STRIP][side] >> (column % STRIP) & 1 == 1;
-                (across(columns, column, side).map_or(ABSENT, |other| room(columns, state, other)), is_linked)
+                let is_linked = self.linked[column / STRIP][side as usize] >> (column % STRIP) & 1 == 1;
+                (
+                    cliffs::beside(columns, column, side).map_or(ABSENT, |other| room(columns, state, other)),
+                    is_linked,
+                )
             });
             if full[end] {
                 over::<true>(step, rooms[end], beyond)
@@ -70,7 +74,7 @@ impl Walls {
         let [before, behind, walls] = [0, 1, 2].map(|which| 0.5 * (one[which] + other[which]));
         let held = f64::from((before + behind) + walls);
         let taken = [0, 1].map(|side| {
-            let others = [i, j].map(|column| across(columns, column, sides[side]));
+            let others = [i, j].map(|column| cliffs::beside(columns, column, sides[side]));
             let [Some(first), Some(second)] = others else { return 0.0 };
             let depth = self::mean(self::rooms(columns, state, [first, second]));
             let contact = [before, behind][side];
@@ -113,18 +117,4 @@ fn over<const FULL: bool>(step: &Step, own: Room, beyond: [(Room, bool); 2]) -> 
     let [one, two] =
         beyond.map(|(beyond, is_linked)| beside::side::<FULL, true>(step, own, inverse, beyond, is_linked));
     [one[0], two[0], beside::walls::<FULL>(step, high, inverse, [one[1], two[1]])]
-}
-
-/// The column beside another one over a side, in the order of links; it may be absent.
-fn across(columns: &Columns, i: usize, bit: usize) -> Option<usize> {
-    let (strip, position) = (i / STRIP, i % STRIP);
-    let beyond = |strip: u32| (strip != NONE).then(|| strip as usize * STRIP + position);
-    match bit {
-        0 if position + 1 < STRIP => Some(i + 1),
-        0 => columns.east(strip).map(|_| i + 1),
-        1 => beyond(columns.south(strip)),
-        2 if position > 0 => Some(i - 1),
-        2 => columns.west(strip).map(|_| i - 1),
-        _ => beyond(columns.north(strip)),
-    }
 }

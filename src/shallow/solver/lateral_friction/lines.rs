@@ -9,8 +9,9 @@
 use std::ops::Range;
 
 use super::buffers::{Lines, Numbers};
-use super::{Liquid, spread, within};
+use super::{Liquid, numbers_of, spread, within};
 use crate::numeric::cpu::dispatch;
+use crate::numeric::lists::reset;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_from, strip_mut, strip_of};
 use crate::shallow::solver::fast_films::NORMAL;
 use crate::shallow::solver::pressurised::network::Network;
@@ -43,8 +44,7 @@ impl Lines {
             numbers.fit(6 + position, len);
         }
         for far in self.far.iter_mut().flatten() {
-            far.clear();
-            far.resize(strips, NONE);
+            reset(far, strips, NONE);
         }
     }
 
@@ -66,34 +66,22 @@ impl Lines {
         known: &[bool],
         beside: &[[Numbers; 3]; 2],
     ) {
-        let (len, is_divided) = (liquid.columns.len(), liquid.is_divided);
-        let all = 0..len / STRIP;
+        let len = liquid.columns.len();
         let count = reductions(step, liquid.row_depths.iter().copied().max().unwrap_or(0));
         let Self { now, next, solved, far: [far, farther] } = self;
+        let thins = step.thinning.is_some();
+        let solved = solved.each_mut().map(|numbers| &mut numbers.all_mut()[..len]);
         {
-            let none: [&[u32]; 2] = [&[], &[]];
-            let empty = &*next;
-            let pass = Pass { step, liquid, known, beside, now: empty, far: none, distance: 1 };
-            let thins = step.thinning.is_some();
+            // The first pass reads no coefficients.
+            let pass = Pass { step, liquid, known, beside, now: next, far: [&[], &[]], distance: 1 };
             if count == 0 {
-                let [east, south] = solved.each_mut().map(|numbers| &mut numbers.all_mut()[..len]);
-                spread(is_divided, all, [east, south], &|range: Range<usize>, out: [&mut [f32]; 2]| {
-                    let mut out = out;
-                    first_and_last(&pass, within(strips, &range), range.start, &mut out, thins);
+                return pass.over(strips, solved, |pass, strips, start, out| {
+                    first_and_last(pass, strips, start, out, thins);
                 });
-                return;
             }
-            let [[a, b, c], [d, e, f]] =
-                now.each_mut().map(|axis| axis.each_mut().map(|numbers| &mut numbers.all_mut()[..len]));
-            spread(
-                is_divided,
-                all.clone(),
-                [a, b, c, d, e, f],
-                &|range: Range<usize>, out: [&mut [f32]; 6]| {
-                    let mut out = out;
-                    first(&pass, within(strips, &range), range.start, &mut out, thins);
-                },
-            );
+            pass.over(strips, numbers_of(now, len), |pass, strips, start, out| {
+                first(pass, strips, start, out, thins);
+            });
         }
         set_flooded(now, liquid.network);
         for strip in 0..far[0].len() {
@@ -109,17 +97,7 @@ impl Lines {
                 far: far.each_ref().map(|far| &far[..]),
                 distance: 1 << reduction,
             };
-            let [[a, b, c], [d, e, f]] =
-                next.each_mut().map(|axis| axis.each_mut().map(|numbers| &mut numbers.all_mut()[..len]));
-            spread(
-                is_divided,
-                all.clone(),
-                [a, b, c, d, e, f],
-                &|range: Range<usize>, out: [&mut [f32]; 6]| {
-                    let mut out = out;
-                    reduce(&pass, within(strips, &range), range.start, &mut out);
-                },
-            );
+            pass.over(strips, numbers_of(next, len), reduce);
             std::mem::swap(now, next);
             for (far, farther) in far.iter().zip(&mut *farther) {
                 for (position, &other) in farther.iter_mut().zip(far) {
@@ -130,10 +108,21 @@ impl Lines {
         }
         let far = far.each_ref().map(|far| &far[..]);
         let pass = Pass { step, liquid, known, beside, now, far, distance: 1 << count };
-        let [east, south] = solved.each_mut().map(|numbers| &mut numbers.all_mut()[..len]);
-        spread(is_divided, all, [east, south], &|range: Range<usize>, out: [&mut [f32]; 2]| {
-            let mut out = out;
-            last(&pass, within(strips, &range), range.start, &mut out);
+        pass.over(strips, solved, last);
+    }
+}
+
+impl Pass<'_> {
+    /// Calls `work` with strips, the first strip of the output, and their part of it; on several threads if the liquid is divided.
+    fn over<const N: usize>(
+        &self,
+        strips: &[u32],
+        out: [&mut [f32]; N],
+        work: impl Fn(&Self, &[u32], usize, &mut [&mut [f32]; N]) + Sync,
+    ) {
+        let all = 0..self.liquid.columns.len() / STRIP;
+        spread(self.liquid.is_divided, all, out, &|range: Range<usize>, mut out: [&mut [f32]; N]| {
+            work(self, within(strips, &range), range.start, &mut out);
         });
     }
 }
@@ -161,17 +150,17 @@ fn set_flooded(now: &mut [[Numbers; 3]; 2], network: &Network) {
 
 fn first_and_last(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2], thins: bool) {
     if thins {
-        dispatch!(solve_thinning(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]));
+        dispatch!(solve_strips::<true>(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]));
     } else {
-        dispatch!(solve_newtonian(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]));
+        dispatch!(solve_strips::<false>(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]));
     }
 }
 
 fn first(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6], thins: bool) {
     if thins {
-        dispatch!(begin_thinning(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]));
+        dispatch!(begin_strips::<true>(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]));
     } else {
-        dispatch!(begin_newtonian(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]));
+        dispatch!(begin_strips::<false>(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]));
     }
 }
 
@@ -181,26 +170,6 @@ fn reduce(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]) 
 
 fn last(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]) {
     dispatch!(end_strips(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]));
-}
-
-#[inline(always)]
-fn solve_thinning(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]) {
-    solve_strips::<true>(pass, strips, start, out);
-}
-
-#[inline(always)]
-fn solve_newtonian(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]) {
-    solve_strips::<false>(pass, strips, start, out);
-}
-
-#[inline(always)]
-fn begin_thinning(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]) {
-    begin_strips::<true>(pass, strips, start, out);
-}
-
-#[inline(always)]
-fn begin_newtonian(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]) {
-    begin_strips::<false>(pass, strips, start, out);
 }
 
 /// r, a and b of a strip's pipes.

@@ -19,6 +19,7 @@ mod buffers;
 mod flooded;
 mod lines;
 
+use buffers::Numbers;
 pub use buffers::Walls;
 use std::ops::Range;
 
@@ -26,6 +27,7 @@ use super::active::Active;
 use super::fast_films::Fast;
 use super::pressurised::network::Network;
 use super::viscous_flux::Step;
+use crate::numeric::lists::{refill, reset, split_each};
 use crate::shallow::columns::grid::TOP;
 use crate::shallow::columns::{Columns, STRIP, strip_of};
 use crate::shallow::pipes::{Links, Pipes};
@@ -67,17 +69,13 @@ impl Walls {
         }
         let (strips, len) = (columns.strips().len(), columns.len());
         self.age = 0;
-        self.rows.clear();
-        self.rows.resize(columns.grid.size[1], false);
+        reset(&mut self.rows, columns.grid.size[1], false);
         self.strips.clear();
         self.strips.reserve(strips);
-        self.known.clear();
-        self.known.resize(strips, false);
-        self.linked.clear();
-        self.linked.resize(strips, [0; 4]);
+        reset(&mut self.known, strips, false);
+        reset(&mut self.linked, strips, [0; 4]);
         let has_roof = |strip| strip_of(columns.ceilings(), strip).iter().any(|&ceiling| ceiling < TOP);
-        self.roofed.clear();
-        self.roofed.extend((0..strips).map(has_roof));
+        refill(&mut self.roofed, (0..strips).map(has_roof));
         if self.len != len {
             self.len = len;
             for (position, numbers) in self.beside.iter_mut().flatten().enumerate() {
@@ -182,13 +180,18 @@ impl Walls {
         let Self { strips, roofed, linked, beside, .. } = self;
         let around = beside::Around { columns: liquid.columns, depth: liquid.depth, roofed, linked };
         let len = liquid.columns.len();
-        let [[a, b, c], [d, e, f]] =
-            beside.each_mut().map(|axis| axis.each_mut().map(|n| &mut n.all_mut()[..len]));
         let work = |range: Range<usize>, out: [&mut [f32]; 6]| {
             beside::find(step, &around, within(strips, &range), range.start, out);
         };
-        spread(liquid.is_divided, 0..len / STRIP, [a, b, c, d, e, f], &work);
+        spread(liquid.is_divided, 0..len / STRIP, numbers_of(beside, len), &work);
     }
+}
+
+/// The first `len` numbers of six lists.
+fn numbers_of(lists: &mut [[Numbers; 3]; 2], len: usize) -> [&mut [f32]; 6] {
+    let [[a, b, c], [d, e, f]] =
+        lists.each_mut().map(|axis| axis.each_mut().map(|numbers| &mut numbers.all_mut()[..len]));
+    [a, b, c, d, e, f]
 }
 
 /// Those strips of a sorted list that are within a range.
@@ -209,13 +212,7 @@ fn spread<const N: usize>(
     }
     let half = strips.len() / 2;
     let middle = strips.start + half;
-    let mut behind = [(); N].map(|()| &mut [][..]);
-    let mut positions = behind.iter_mut();
-    let before = out.map(|numbers| {
-        let (before, rest) = numbers.split_at_mut(half * STRIP);
-        *positions.next().expect("as many") = rest;
-        before
-    });
+    let [before, behind] = split_each(out, half * STRIP);
     rayon::join(
         || spread(true, strips.start..middle, before, work),
         || spread(true, middle..strips.end, behind, work),

@@ -5,6 +5,7 @@
 
 use super::edges::{At, Edge};
 use super::nodes::{GIVE, LINK_SCALE, Node, scaled};
+use crate::numeric::lists::{refill, reset};
 use crate::shallow::columns::NONE;
 use crate::shallow::solver::stop::Stop;
 
@@ -82,11 +83,11 @@ impl Gradients {
             self.through.push(through);
         }
         let links = edges.iter().filter(|edge| matches!(edge.at, At::Link(_)));
-        self.links.clear();
-        self.links
-            .extend(links.map(|edge| Link { ends: edge.ends.map(node), conductance: edge.conductance }));
-        self.linked.clear();
-        self.linked.resize(if self.links.is_empty() { 0 } else { count + 1 }, 0);
+        refill(
+            &mut self.links,
+            links.map(|edge| Link { ends: edge.ends.map(node), conductance: edge.conductance }),
+        );
+        reset(&mut self.linked, if self.links.is_empty() { 0 } else { count + 1 }, 0);
     }
 
     /// Solves for the heads above the surface of the nodes in the system, starting from their present ones. If stopped, the result is
@@ -125,12 +126,10 @@ impl Gradients {
             (&mut self.direction, |node| if node.is_held { node.over } else { 0.0 }),
         ];
         for (list, number) in lists {
-            list.clear();
-            list.extend(nodes.iter().map(number));
+            refill(list, nodes.iter().map(number));
         }
         self.direction.push(0.0);
-        self.held.clear();
-        self.held.resize(count, 1.0);
+        reset(&mut self.held, count, 1.0);
         self.product.resize(count, 0.0);
         self.apply();
         for (at, node) in nodes.iter_mut().enumerate() {
@@ -210,8 +209,7 @@ impl Gradients {
 
     fn along(&mut self) -> f64 {
         let Self { addends, direction, product, .. } = self;
-        addends.clear();
-        addends.extend(direction.iter().zip(product).map(|(direction, product)| direction * *product));
+        refill(addends, direction.iter().zip(product).map(|(direction, product)| direction * *product));
         fixed_sum(addends)
     }
 
@@ -221,8 +219,7 @@ impl Gradients {
         let part = |((residual, diagonal), held): ((&f64, &f64), &f64)| {
             if *held > 0.0 { residual * residual / diagonal } else { 0.0 }
         };
-        addends.clear();
-        addends.extend(nodes.map(part));
+        refill(addends, nodes.map(part));
         fixed_sum(addends)
     }
 }

@@ -13,6 +13,8 @@ use super::nodes::{EQUAL, Node, section};
 use crate::shallow::columns::per_column::{Array, PerColumn};
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_mut, strip_of};
 use crate::shallow::pipes::Pipes;
+use crate::shallow::pipes::cliffs::beside;
+use crate::shallow::pipes::side::Side;
 use crate::shallow::solver::full::full_of;
 use crate::shallow::solver::lateral_friction::Walls;
 use crate::shallow::solver::link_flow::LinkFlow;
@@ -212,26 +214,22 @@ impl Network {
     fn connect(&mut self, step: &Step, columns: &Columns, pipes: &Pipes, rows: &[bool], state: &State) {
         for node in 0..self.nodes.len() {
             let i = self.parties[node].column as usize;
-            let (strip, position) = (i / STRIP, i % STRIP);
-            let beyond = |strip: u32| (strip != NONE).then(|| strip as usize * STRIP + position);
-            let west = if position > 0 { Some(i - 1) } else { columns.west(strip).map(|_| i - 1) };
+            let next = |side| beside(columns, i, side);
             if pipes.east[i] > 0.0 {
                 let edge = self.join(step, columns, state, At::East(i as u32), [i, i + 1], pipes.east[i]);
                 self.meet(edge, node, 0, i + 1, 1);
             }
-            if let Some(j) = beyond(columns.south(strip)).filter(|_| pipes.south[i] > 0.0) {
+            if let Some(j) = next(Side::South).filter(|_| pipes.south[i] > 0.0) {
                 let edge = self.join(step, columns, state, At::South(i as u32), [i, j], pipes.south[i]);
                 self.meet(edge, node, 2, j, 3);
             }
             // A pipe between two full columns was already added by the other one.
             let is_node = |network: &Self, j: usize| (network.party_of[j] as usize) < network.nodes.len();
-            if let Some(j) = west.filter(|&j| pipes.east[j] > 0.0 && !is_node(self, j)) {
+            if let Some(j) = next(Side::West).filter(|&j| pipes.east[j] > 0.0 && !is_node(self, j)) {
                 let edge = self.join(step, columns, state, At::East(j as u32), [j, i], pipes.east[j]);
                 self.nodes[node].edges[1] = edge;
             }
-            if let Some(j) =
-                beyond(columns.north(strip)).filter(|&j| pipes.south[j] > 0.0 && !is_node(self, j))
-            {
+            if let Some(j) = next(Side::North).filter(|&j| pipes.south[j] > 0.0 && !is_node(self, j)) {
                 let edge = self.join(step, columns, state, At::South(j as u32), [j, i], pipes.south[j]);
                 self.nodes[node].edges[3] = edge;
             }

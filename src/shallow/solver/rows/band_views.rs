@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 
+use crate::numeric::lists::split_each;
 use crate::shallow::columns::{Columns, STRIP};
 use crate::shallow::pipes::Links;
 use crate::shallow::scalars::MOST;
@@ -68,20 +69,19 @@ impl Copy {
         let (columns, links) = (indices(columns, &rows), link_range(links, &rows));
         self.rows = rows;
         // Padded by one strip, so that the column to the east of the last one can be read.
-        self.depth.clear();
-        self.depth.extend_from_slice(&liquid.depth[columns.start..columns.end + STRIP]);
+        liquid.depth[columns.start..columns.end + STRIP].clone_into(&mut self.depth);
         for axis in 0..2 {
-            copy(&mut self.flux[axis], &liquid.flux[axis][columns.clone()]);
-            copy(&mut self.left[axis], &liquid.left[axis][columns.clone()]);
+            liquid.flux[axis][columns.clone()].clone_into(&mut self.flux[axis]);
+            liquid.left[axis][columns.clone()].clone_into(&mut self.left[axis]);
         }
         for (own, amounts) in self.amounts.iter_mut().zip(&liquid.amounts) {
-            copy(own, if amounts.is_empty() { &[] } else { &amounts[columns.clone()] });
+            amounts.get(columns.clone()).unwrap_or_default().clone_into(own);
         }
-        copy(&mut self.links.flux, &liquid.links.flux[links.clone()]);
-        copy(&mut self.links.left, &liquid.links.left[links.clone()]);
-        copy(&mut self.links.transfer, &liquid.links.transfer[links.clone()]);
+        liquid.links.flux[links.clone()].clone_into(&mut self.links.flux);
+        liquid.links.left[links.clone()].clone_into(&mut self.links.left);
+        liquid.links.transfer[links.clone()].clone_into(&mut self.links.transfer);
         for (own, fallen) in self.links.fallen.iter_mut().zip(&liquid.links.fallen) {
-            copy(own, if fallen.is_empty() { &[] } else { &fallen[links.clone()] });
+            fallen.get(links.clone()).unwrap_or_default().clone_into(own);
         }
     }
 
@@ -101,22 +101,6 @@ impl Copy {
             )
         }
     }
-}
-
-fn copy<T: Clone>(to: &mut Vec<T>, from: &[T]) {
-    to.clear();
-    to.extend_from_slice(from);
-}
-
-/// Arrays of scalars, split in two; empty where there are none.
-type Halves<'a> = ([&'a mut [f64]; MOST], [&'a mut [f64]; MOST]);
-
-fn split(all: [&mut [f64]; MOST], at: usize) -> Halves<'_> {
-    let [mut before, mut behind] = [(); 2].map(|()| [(); MOST].map(|()| &mut [][..]));
-    for (scalar, numbers) in all.into_iter().enumerate() {
-        (before[scalar], behind[scalar]) = numbers.split_at_mut(at.min(numbers.len()));
-    }
-    (before, behind)
 }
 
 impl<'a> Part<'a> {
@@ -148,35 +132,35 @@ impl<'a> Part<'a> {
     pub fn split(self, columns: &Columns, links: &Links, row: usize) -> [Self; 2] {
         let index = indices(columns, &(row..row)).start;
         let link = link_range(links, &(row..row)).start;
-        let (at, at_link) = (index - self.start, link - self.first_link);
-        let [flux_east, flux_south] = self.flux.map(|numbers| numbers.split_at_mut(at));
-        let [left_east, left_south] = self.left.map(|numbers| numbers.split_at_mut(at));
-        let depth = self.depth.split_at_mut(at);
-        let flux = self.links.flux.split_at_mut(at_link);
-        let left = self.links.left.split_at_mut(at_link);
-        let transfer = self.links.transfer.split_at_mut(at_link);
-        let amounts = split(self.amounts, at);
-        let fallen = split(self.links.fallen, at_link);
-        [
-            Self {
-                start: self.start,
-                first_link: self.first_link,
-                depth: depth.0,
-                flux: [flux_east.0, flux_south.0],
-                left: [left_east.0, left_south.0],
-                links: LinkPart { flux: flux.0, left: left.0, transfer: transfer.0, fallen: fallen.0 },
-                amounts: amounts.0,
-            },
-            Self {
-                start: index,
-                first_link: link,
-                depth: depth.1,
-                flux: [flux_east.1, flux_south.1],
-                left: [left_east.1, left_south.1],
-                links: LinkPart { flux: flux.1, left: left.1, transfer: transfer.1, fallen: fallen.1 },
-                amounts: amounts.1,
-            },
-        ]
+        let Self { start, first_link, .. } = self;
+        let at = index - start;
+        let [[depth], [depth_behind]] = split_each([self.depth], at);
+        let [flux, flux_behind] = split_each(self.flux, at);
+        let [left, left_behind] = split_each(self.left, at);
+        let [links, links_behind] = self.links.split(link - first_link);
+        let [amounts, amounts_behind] = split_each(self.amounts, at);
+        let before = Self { start, first_link, depth, flux, left, links, amounts };
+        let behind = Self {
+            start: index,
+            first_link: link,
+            depth: depth_behind,
+            flux: flux_behind,
+            left: left_behind,
+            links: links_behind,
+            amounts: amounts_behind,
+        };
+        [before, behind]
+    }
+}
+
+impl<'a> LinkPart<'a> {
+    /// Splits the part before a link.
+    fn split(self, at: usize) -> [Self; 2] {
+        let numbers = split_each([self.flux, self.left, self.transfer], at);
+        let [fallen, fallen_behind] = split_each(self.fallen, at);
+        let [before, behind] = numbers;
+        let part = |[flux, left, transfer]: [&'a mut [f32]; 3], fallen| Self { flux, left, transfer, fallen };
+        [part(before, fallen), part(behind, fallen_behind)]
     }
 }
 

@@ -17,7 +17,7 @@ use super::link_step::{Outside, indices_of};
 use super::transfers::inflow_limit::most_through_links;
 use super::transfers::scale;
 use super::transfers::whole_units::{find_woken, move_units};
-use super::viscous_flux::{Carried, Kind, Of, Row, Step, flux_row, max, solved_row};
+use super::viscous_flux::{Carried, Kind, Row, Step, by_kind, flux_row, max, solved_row};
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{NONE, STRIP};
 use crate::shallow::scalars::MOST;
@@ -39,23 +39,10 @@ impl Rows {
         deepest: &mut [i32],
         stepped: &mut Stepped,
     ) {
-        /// Instantiates the step for each variant of flow and each instruction set.
-        macro_rules! run {
-            ($($viscous:literal $whole:literal $thins:literal)*) => {
-                match (step.drag > 0.0, step.is_whole, step.drag > 0.0 && step.thinning.is_some()) {
-                    $(($viscous, $whole, $thins) => {
-                        #[inline(always)]
-                        fn body(rows: &mut Rows, step: &Step, ground: &Ground, parts: &mut Parts, deepest: &mut [i32], stepped: &mut Stepped) {
-                            rows.run::<Of<$viscous, $whole, $thins>>(step, ground, parts, deepest, stepped);
-                        }
-                        let rows = self;
-                        dispatch!(body(rows: &mut Rows, step: &Step, ground: &Ground, parts: &mut Parts, deepest: &mut [i32], stepped: &mut Stepped))
-                    })*
-                    (false, _, true) => unreachable!("only viscosity thins"),
-                }
-            };
-        }
-        run!(true true true true true false true false true true false false false true false false false false)
+        let rows = self;
+        by_kind!(step, K => dispatch!(Rows::run::<K>(
+            rows: &mut Rows, step: &Step, ground: &Ground, parts: &mut Parts, deepest: &mut [i32], stepped: &mut Stepped
+        )))
     }
 
     #[inline(always)]
@@ -96,7 +83,7 @@ impl Rows {
             // The row at a distance behind the front, if the band includes it.
             let at = |distance: usize| front.checked_sub(distance).filter(|row| (start..count).contains(row));
             if let Some(row) = at(1) {
-                self.shrink(ground, parts, row);
+                self.scale::<true>(ground, parts, row);
             }
             if let Some(row) = at(1).filter(|_| behind > 1) {
                 let is_full = self.find_most(ground, parts, row);
@@ -106,7 +93,7 @@ impl Rows {
                 self.find_more(ground, parts, row);
             }
             if let Some(row) = at(behind).filter(|row| row + 1 >= own.start) {
-                self.fit(ground, parts, row);
+                self.scale::<false>(ground, parts, row);
                 self.move_links(ground, parts, row, &mut stepped.outside);
                 if own.contains(&row) {
                     deepest[row - own.start] = self.transfer(ground, parts, row, &mut stepped.woken);
@@ -265,24 +252,29 @@ impl Rows {
         is_less
     }
 
-    /// Multiplies a row's transfers by K_min.
+    /// Multiplies a row's transfers by K_min of the donors (`GIVES`), or by K_max of the receivers.
     #[inline(always)]
-    fn shrink(&mut self, ground: &Ground, parts: &mut Parts, row: usize) {
+    fn scale<const GIVES: bool>(&mut self, ground: &Ground, parts: &mut Parts, row: usize) {
         let [own, south] = self.ring.get_disjoint_mut([row % RING, (row + 1) % RING]).expect("two rows");
-        let south_is_less = south.is_less && row + 1 < ground.columns.grid.size[1];
-        if !own.is_less && !south_is_less {
+        let has_south = row + 1 < ground.columns.grid.size[1];
+        let (is_scaled, south_is_scaled, own_factors, south_factors) = if GIVES {
+            (own.is_less, has_south && south.is_less, &own.least, &south.least)
+        } else {
+            (own.is_full, has_south && south.is_full, &own.most[1], &south.most[1])
+        };
+        if !is_scaled && !south_is_scaled {
             return;
         }
-        let least = if own.is_less { &own.least } else { &self.ones };
-        let beyond = if south_is_less { &south.least } else { &self.ones };
+        let factors = if is_scaled { own_factors } else { &self.ones };
+        let beyond = if south_is_scaled { south_factors } else { &self.ones };
         let position = Place::new(ground.columns, row);
         let part = parts.of(row);
         let [flux_east, flux_south] = &mut part.flux;
         for span in ground.active.row(row) {
             let (at, len) = (position.of(span.first), span.len as usize);
             let mine = span.first as usize - part.start;
-            let factor = position.beside(least, beyond, &self.ones, span);
-            scale::shrink(
+            let factor = position.beside(factors, beyond, &self.ones, span);
+            scale::scale::<GIVES>(
                 &factor,
                 &mut own.east[at..at + len],
                 &mut own.south[at..at + len],
@@ -291,8 +283,8 @@ impl Rows {
             );
         }
         let first_link = part.first_link;
-        let factor = |column| position.pick(least, beyond, column);
-        part.links.scale(&ground.pipes.links, ground.overflow_edges, (row, first_link), true, factor);
+        let factor = |column| position.pick(factors, beyond, column);
+        part.links.scale(&ground.pipes.links, ground.overflow_edges, (row, first_link), GIVES, factor);
     }
 
     /// Applies the transfers of a row's links to the band's own columns.

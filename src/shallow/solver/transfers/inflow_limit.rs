@@ -91,36 +91,6 @@ impl Rows {
             most[position.of(column)] = first_most[position.of(column)];
         }
     }
-
-    /// Multiplies a row's transfers by K_max.
-    #[inline(always)]
-    pub(in crate::shallow::solver) fn fit(&mut self, ground: &Ground, parts: &mut Parts, row: usize) {
-        let [own, south] = self.ring.get_disjoint_mut([row % RING, (row + 1) % RING]).expect("two rows");
-        let south_is_full = south.is_full && row + 1 < ground.columns.grid.size[1];
-        if !own.is_full && !south_is_full {
-            return;
-        }
-        let most = if own.is_full { &own.most[1] } else { &self.ones };
-        let beyond = if south_is_full { &south.most[1] } else { &self.ones };
-        let position = Place::new(ground.columns, row);
-        let part = parts.of(row);
-        let [flux_east, flux_south] = &mut part.flux;
-        for span in ground.active.row(row) {
-            let (at, len) = (position.of(span.first), span.len as usize);
-            let mine = span.first as usize - part.start;
-            let factor = position.beside(most, beyond, &self.ones, span);
-            scale::fit(
-                &factor,
-                &mut own.east[at..at + len],
-                &mut own.south[at..at + len],
-                &mut flux_east[mine..mine + len],
-                &mut flux_south[mine..mine + len],
-            );
-        }
-        let first_link = part.first_link;
-        let factor = |column| position.pick(most, beyond, column);
-        part.links.scale(&ground.pipes.links, ground.overflow_edges, (row, first_link), false, factor);
-    }
 }
 
 /// The maximum inflow through links of a column of a row (units); `sums` are 0 before and after.

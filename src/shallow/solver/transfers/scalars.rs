@@ -6,6 +6,7 @@
 
 use super::whole_units::take_along;
 use crate::numeric::cpu::dispatch;
+use crate::numeric::lists::refill;
 use crate::shallow::columns::{NONE, STRIP, strip_mut, strip_of};
 use crate::shallow::scalars::amounts::{Act, Changes};
 use crate::shallow::scalars::shares::{LEVELS, MOST, integer, level, nearest, share};
@@ -252,8 +253,7 @@ impl Network {
         changes: &mut Changes,
     ) {
         let of = |column: u32| level(amounts[column as usize], depth[column as usize]);
-        levels.clear();
-        levels.extend(self.parties.iter().map(|party| of(party.column)));
+        refill(levels, self.parties.iter().map(|party| of(party.column)));
         for edge in self.edges.iter().filter(|edge| edge.units != 0) {
             let [from, to] = edge.ends;
             if let At::Link(link) = edge.at

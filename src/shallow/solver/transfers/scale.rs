@@ -100,49 +100,27 @@ fn least_of(depth: &[i32; STRIP], out: &mut [f32; STRIP], least: &mut [f32; STRI
     }
 }
 
-/// Multiplies transfers and fluxes by K_min of the donors.
+/// Multiplies transfers and fluxes by K_min of the donors (`GIVES`), or by K_max of the receivers.
 #[inline(always)]
-pub fn shrink(
-    least: &Beside,
-    east: &mut [f32],
-    south: &mut [f32],
-    flux_east: &mut [f32],
-    flux_south: &mut [f32],
-) {
-    scale(least, east, south, flux_east, flux_south, |own, other| [own, other]);
-}
-
-/// Multiplies transfers and fluxes by K_max of the receivers.
-#[inline(always)]
-pub fn fit(
-    most: &Beside,
-    east: &mut [f32],
-    south: &mut [f32],
-    flux_east: &mut [f32],
-    flux_south: &mut [f32],
-) {
-    scale(most, east, south, flux_east, flux_south, |own, other| [other, own]);
-}
-
-/// Multiplies by the factor that `order` puts first where liquid flows away from a column, and by the other where it flows towards it.
-#[inline(always)]
-fn scale(
+pub fn scale<const GIVES: bool>(
     factor: &Beside,
     east: &mut [f32],
     south: &mut [f32],
     flux_east: &mut [f32],
     flux_south: &mut [f32],
-    order: impl for<'a> Fn(&'a [f32; STRIP], &'a [f32; STRIP]) -> [&'a [f32; STRIP]; 2],
 ) {
     for strip in 0..east.len() / STRIP {
         let own = strip_of(factor.own, strip);
-        let factors = order(own, strip_from(factor.own, strip * STRIP + 1));
+        let beyond = strip_from(factor.own, strip * STRIP + 1);
+        let factors = if GIVES { [own, beyond] } else { [beyond, own] };
         scale_strip(factors, strip_mut(east, strip), strip_mut(flux_east, strip));
-        let factors = order(own, strip_of(factor.south, strip));
+        let beyond = strip_of(factor.south, strip);
+        let factors = if GIVES { [own, beyond] } else { [beyond, own] };
         scale_strip(factors, strip_mut(south, strip), strip_mut(flux_south, strip));
     }
 }
 
+/// Multiplies by the first factor where liquid flows away from a column, and by the second where it flows towards it.
 #[inline(always)]
 fn scale_strip([away, towards]: [&[f32; STRIP]; 2], transfer: &mut [f32; STRIP], flux: &mut [f32; STRIP]) {
     for x in 0..STRIP {

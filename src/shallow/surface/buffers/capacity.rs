@@ -1,5 +1,6 @@
 //! Maximum size of a mesh of liquid in given columns.
 
+use crate::numeric::lists::refill;
 use crate::shallow::columns::grid::BOTTOMLESS;
 use crate::shallow::columns::{Columns, STRIP};
 use crate::shallow::surface::Counts;
@@ -118,8 +119,7 @@ impl Quartet {
                 })
             };
             most += if count > corners || (walls > 0 && !all_link()) {
-                changes.clear();
-                changes.extend(of_set().map(|(room, ..)| room.under).filter(|under| *under != BOTTOMLESS));
+                refill(changes, of_set().map(|(room, ..)| room.under).filter(|under| *under != BOTTOMLESS));
                 changes.sort_unstable();
                 changes.dedup();
                 count.min(2 + 2 * changes.len()) + 6 * walls

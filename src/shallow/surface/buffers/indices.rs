@@ -86,22 +86,14 @@ pub(in crate::shallow::surface) fn write_triangles(
     match out {
         Indices::None => 0,
         Indices::U16(out) => {
-            let done = write_full_u16(found, flipped, out);
+            let done = dispatch!(write_full::<u16>(found: &Found, flipped: bool, out: &mut [u16]) -> usize);
             done + write_odd(scene, found, walls, search, flipped, &mut out[done..])
         }
         Indices::U32(out) => {
-            let done = write_full_u32(found, flipped, out);
+            let done = dispatch!(write_full::<u32>(found: &Found, flipped: bool, out: &mut [u32]) -> usize);
             done + write_odd(scene, found, walls, search, flipped, &mut out[done..])
         }
     }
-}
-
-fn write_full_u16(found: &Found, flipped: bool, out: &mut [u16]) -> usize {
-    dispatch!(write_full(found: &Found, flipped: bool, out: &mut [u16]) -> usize)
-}
-
-fn write_full_u32(found: &Found, flipped: bool, out: &mut [u32]) -> usize {
-    dispatch!(write_full(found: &Found, flipped: bool, out: &mut [u32]) -> usize)
 }
 
 /// Writes the triangles of full quartets and returns the index count.

@@ -1,6 +1,7 @@
 //! Writing the mesh into the caller's buffers.
 
 pub(in crate::shallow::surface) mod capacity;
+pub(in crate::shallow) mod frame;
 pub(in crate::shallow::surface) mod indices;
 pub(in crate::shallow) mod normals;
-pub(in crate::shallow) mod vertices;
+pub(in crate::shallow::surface) mod vertices;

@@ -1,6 +1,7 @@
 //! Normals of wet columns, from the heights of the wet columns that they are linked with on their four sides: central differences,
 //! one-sided where there is no such column.
 
+use crate::numeric::lists::reset;
 use crate::shallow::columns::{Columns, STRIP};
 use crate::shallow::surface::quartets::links::Scene;
 use crate::shallow::surface::quartets::strips::Found;
@@ -66,8 +67,7 @@ impl Normals {
     pub fn reset(&mut self, columns: &Columns) {
         if self.normals.len() != columns.len() {
             self.normals.resize(columns.len(), [0.0; 3]);
-            self.known.clear();
-            self.known.resize(columns.len() / STRIP, 0);
+            reset(&mut self.known, columns.len() / STRIP, 0);
         }
     }
 

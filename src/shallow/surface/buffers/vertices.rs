@@ -1,8 +1,8 @@
 //! Writes vertices into the caller's buffers: in order, and without reading them.
 
-use crate::shallow::surface::rim::hem::Hem;
 use std::ops::Range;
 
+use super::frame::{Frame, Vertex};
 use super::normals::{Normals, Shown, upright};
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::strip_of;
@@ -11,10 +11,8 @@ use crate::shallow::scalars::MOST;
 use crate::shallow::surface::quartets::links::Scene;
 use crate::shallow::surface::quartets::strips::{Found, Span};
 use crate::shallow::surface::rim::boundary::{Around, Wall, walls_of};
-use crate::shallow::surface::{Depths, Layout, Target, Up};
-
-/// Velocity at the surface over the mean (Eq. 4.4).
-pub(in crate::shallow) const SURFACE_SPEED: f32 = 1.5;
+use crate::shallow::surface::rim::hem::Hem;
+use crate::shallow::surface::{Depths, Layout, Target};
 
 /// A run starts within a strip if at least `LONG` columns at its end belong to it; up to `SHORT` adjacent columns are written one by one.
 const LONG: u32 = 8;
@@ -28,31 +26,10 @@ pub(in crate::shallow::surface) struct Vertices<'a> {
     velocity: &'a [[f32; 2]],
     carried: [&'a [f32]; MOST],
     wants_normals: bool,
-    z_up: bool,
-    /// Sign of z.
-    sign: f32,
-    /// Height of 0, and of a unit; centre of cell (0, 0), and edge of a cell (m x scale).
-    low: f32,
-    unit: f32,
+    frame: Frame,
     /// The caller's units per metre, and how far hems are below the ground (units).
     scale: f32,
     least: i32,
-    origin: [f32; 2],
-    cell: f32,
-    /// Speed at the surface (m/s x scale) per mean speed (m/s); opacity of one unit.
-    speed: f32,
-    opacity: f32,
-}
-
-/// A vertex, y up.
-struct Vertex {
-    position: [f32; 3],
-    normal: [f32; 3],
-    velocity: [f32; 2],
-    carried: [f32; MOST],
-    depth: i32,
-    layer: u32,
-    column: u32,
 }
 
 /// Wet columns in a row of a span that full quartets link with wet ones on all sides.
@@ -75,7 +52,6 @@ impl<'a> Vertices<'a> {
         wants_normals: bool,
     ) -> Self {
         let (grid, heights) = (&scene.columns.grid, &scene.columns.heights);
-        let scale = layout.scale;
         let slope = (0.5 * heights.unit / grid.cell) as f32;
         Self {
             shown: Shown { scene, heights: shown, slope },
@@ -84,16 +60,9 @@ impl<'a> Vertices<'a> {
             velocity: depths.velocity,
             carried: depths.carried,
             wants_normals,
-            z_up: layout.up == Up::Z,
-            sign: if layout.left_handed == (layout.up == Up::Y) { -1.0 } else { 1.0 },
-            low: (heights.low * scale) as f32,
-            unit: (heights.unit * scale) as f32,
-            scale: scale as f32,
+            frame: Frame::of(scene.columns, layout),
+            scale: layout.scale as f32,
             least: (layout.least_depth / heights.unit).min(f64::from(i32::MAX / 2)) as i32,
-            origin: grid.centre([0, 0]).map(|centre| (centre * scale) as f32),
-            cell: (grid.cell * scale) as f32,
-            speed: SURFACE_SPEED * scale as f32,
-            opacity: (heights.unit / layout.opaque_depth) as f32,
         }
     }
 
@@ -108,18 +77,6 @@ impl<'a> Vertices<'a> {
         ))
     }
 
-    /// Converts units to a height (m x scale).
-    #[inline(always)]
-    fn height(&self, units: f32) -> f32 {
-        self.low + units * self.unit
-    }
-
-    /// Centre of a column or row of cells (m x scale).
-    #[inline(always)]
-    fn centre(&self, axis: usize, cell: i32) -> f32 {
-        self.origin[axis] + cell as f32 * self.cell
-    }
-
     /// The scalars that a column carries.
     #[inline(always)]
     fn carried(&self, index: usize) -> [f32; MOST] {
@@ -129,7 +86,7 @@ impl<'a> Vertices<'a> {
     /// A vertex with the mean of the wet columns around cell (x, z), at a height of at most `most` (units).
     fn mean(&self, [x, z]: [usize; 2], most: i32, normals: &mut Normals, around: &Around) -> Vertex {
         let mean = around.mean_height(|index| self.shown.heights[index]);
-        let height = self.height(mean.min(f64::from(most)) as f32);
+        let height = self.frame.height(mean.min(f64::from(most)) as f32);
         let mut normal = [0.0, 1.0, 0.0];
         if self.wants_normals {
             let [x, y, z] = around.sum(|index| normals.of(&self.shown, self.found, index));
@@ -146,7 +103,7 @@ impl<'a> Vertices<'a> {
         if self.carried.iter().any(|numbers| !numbers.is_empty()) {
             carried = around.sum(|index| self.carried(index)).map(|sum| sum / around.len().max(1) as f32);
         }
-        let position = [self.centre(0, x as i32), height, self.centre(1, z as i32)];
+        let position = [self.frame.centre(0, x as i32), height, self.frame.centre(1, z as i32)];
         Vertex { position, normal, velocity, carried, depth: 0, layer: 0, column: NONE }
     }
 
@@ -164,9 +121,9 @@ impl<'a> Vertices<'a> {
             let mean = self.mean([x, z], self.shown.heights[index], normals, around);
             return Vertex { layer, column: index as u32, ..mean };
         }
-        let height = self.height(self.shown.heights[index] as f32);
+        let height = self.frame.height(self.shown.heights[index] as f32);
         Vertex {
-            position: [self.centre(0, x as i32), height, self.centre(1, z as i32)],
+            position: [self.frame.centre(0, x as i32), height, self.frame.centre(1, z as i32)],
             normal: if self.wants_normals {
                 normals.of(&self.shown, self.found, index)
             } else {
@@ -180,58 +137,28 @@ impl<'a> Vertices<'a> {
         }
     }
 
-    /// Writes one vertex.
-    fn put(&self, at: usize, vertex: &Vertex, target: &mut Target<'_>) {
-        let put = |out: &mut Option<&mut [f32]>, [x, up, z]: [f32; 3]| {
-            if let Some(out) = out {
-                out[3 * at..][..3].copy_from_slice(&self.order(x, up, z * self.sign));
-            }
-        };
-        let [u, w] = vertex.velocity.map(|speed| speed * self.speed);
-        put(&mut target.positions, vertex.position);
-        put(&mut target.normals, vertex.normal);
-        put(&mut target.velocities, [u, 0.0, w]);
-        if let Some(out) = &mut target.depths {
-            out[at] = vertex.depth as f32 * self.unit;
-        }
-        if let Some(out) = &mut target.opacities {
-            out[at] = (vertex.depth as f32 * self.opacity).min(1.0);
-        }
-        for (out, carried) in target.carried.iter_mut().zip(vertex.carried) {
-            if let Some(out) = out {
-                out[at] = carried;
-            }
-        }
-        if let Some(out) = &mut target.layers {
-            out[at] = vertex.layer;
-        }
-        if let Some(out) = &mut target.columns {
-            out[at] = vertex.column;
-        }
-    }
-
     /// Writes the vertex where the surface of a column comes down to the ground's edge.
     pub fn put_hem(&self, at: usize, hem: &Hem, target: &mut Target<'_>) {
         let columns = self.shown.scene.columns;
         let index = hem.column as usize;
         let [x, z] = columns.cell(index);
         let [along, across] = hem.offset();
-        let rise = hem.rise * self.scale / self.unit;
+        let rise = hem.rise * self.scale / self.frame.unit;
         let ground = columns.bases()[index].wrapping_sub(self.least) as f32 + rise;
-        let height = self.height(ground.max(columns.unders()[index] as f32));
-        let fall = self.height(self.shown.heights[index] as f32) - height;
+        let height = self.frame.height(ground.max(columns.unders()[index] as f32));
+        let fall = self.frame.height(self.shown.heights[index] as f32) - height;
         let width = (along * along + across * across).sqrt();
         let mut normal = [0.0, 1.0, 0.0];
         if width > 0.0 {
-            let (out, up) = (fall / width, self.cell * width);
+            let (out, up) = (fall / width, self.frame.cell * width);
             let length = ((along * along + across * across) * (out * out) + up * up).sqrt();
             normal = [along * out / length, up / length, across * out / length];
         }
         let vertex = Vertex {
             position: [
-                self.centre(0, x as i32) + along * self.cell,
+                self.frame.centre(0, x as i32) + along * self.frame.cell,
                 height,
-                self.centre(1, z as i32) + across * self.cell,
+                self.frame.centre(1, z as i32) + across * self.frame.cell,
             ],
             normal,
             velocity: self.velocity.get(index).copied().unwrap_or_default(),
@@ -240,13 +167,7 @@ impl<'a> Vertices<'a> {
             layer: columns.layer(index) as u32,
             column: NONE,
         };
-        self.put(at, &vertex, target);
-    }
-
-    /// Axes in the caller's order.
-    #[inline(always)]
-    fn order(&self, x: f32, up: f32, z: f32) -> [f32; 3] {
-        if self.z_up { [x, z, up] } else { [x, up, z] }
+        self.frame.put(at, &vertex, target);
     }
 
     /// Writes the vertices of a run with wet columns on all sides, starting at `at`.
@@ -265,7 +186,7 @@ impl<'a> Vertices<'a> {
                 let slope =
                     |before: &i32, behind: &i32| before.wrapping_sub(*behind) as f32 * self.shown.slope;
                 let [x, y, z] = upright(slope(west, east), slope(north, south));
-                *out = self.order(x, y, z * self.sign);
+                *out = self.frame.order(x, y, z * self.frame.sign);
             }
         }
         self.put_run(span, run, at, target);
@@ -312,7 +233,7 @@ impl<'a> Vertices<'a> {
             };
             let along = slope([line[x], line[x + 2]], [has(0), has(1)]);
             let [x_up, y, z] = upright(along, slope([north[x], south[x]], [has(2), has(3)]));
-            normals[x] = self.order(x_up, y, z * self.sign);
+            normals[x] = self.frame.order(x_up, y, z * self.frame.sign);
         }
         normals
     }
@@ -326,26 +247,26 @@ impl<'a> Vertices<'a> {
         let step = first - span.first * STRIP;
         let depth = &depths[first..][..len];
         if let Some(out) = &mut target.positions {
-            let z = self.centre(1, strip.row as i32) * self.sign;
+            let z = self.frame.centre(1, strip.row as i32) * self.frame.sign;
             let cells = (strip.at as usize * STRIP + step) as i32..;
             let out = vectors(out, at, len);
             for ((out, height), cell) in out.iter_mut().zip(&heights[first..][..len]).zip(cells) {
-                *out = self.order(self.centre(0, cell), self.height(*height as f32), z);
+                *out = self.frame.order(self.frame.centre(0, cell), self.frame.height(*height as f32), z);
             }
         }
         if let Some(out) = &mut target.velocities {
             for (out, [u, w]) in vectors(out, at, len).iter_mut().zip(&self.velocity[first..][..len]) {
-                *out = self.order(u * self.speed, 0.0, w * self.speed * self.sign);
+                *out = self.frame.order(u * self.frame.speed, 0.0, w * self.frame.speed * self.frame.sign);
             }
         }
         if let Some(out) = &mut target.depths {
             for (out, depth) in out[at..][..len].iter_mut().zip(depth) {
-                *out = *depth as f32 * self.unit;
+                *out = *depth as f32 * self.frame.unit;
             }
         }
         if let Some(out) = &mut target.opacities {
             for (out, depth) in out[at..][..len].iter_mut().zip(depth) {
-                *out = (*depth as f32 * self.opacity).min(1.0);
+                *out = (*depth as f32 * self.frame.opacity).min(1.0);
             }
         }
         for (out, carried) in target.carried.iter_mut().zip(&self.carried) {
@@ -403,7 +324,7 @@ fn write_spans(vertices: &Vertices<'_>, normals: &mut Normals, around: &mut Arou
                 let len = (smooth >> position).trailing_ones();
                 if len <= SHORT {
                     let vertex = vertices.vertex(first + position as usize, normals, around);
-                    vertices.put(next, &vertex, target);
+                    vertices.frame.put(next, &vertex, target);
                     next += 1;
                     left &= left - 1;
                     continue;
@@ -426,7 +347,7 @@ fn write_spans(vertices: &Vertices<'_>, normals: &mut Normals, around: &mut Arou
         let members = wall.members.iter().filter(|member| **member != NONE);
         let layer = members.map(|&member| columns.layer(member as usize) as u32).min().unwrap_or(0);
         let mean = vertices.mean(columns.cell(wall.column as usize), i32::MAX, normals, around);
-        vertices.put(next, &Vertex { layer, ..mean }, target);
+        vertices.frame.put(next, &Vertex { layer, ..mean }, target);
         next += 1;
     }
 }

@@ -22,6 +22,8 @@ use std::ops::Range;
 
 use crate::error::{Error, Result};
 use crate::geometry::Vec3;
+use crate::numeric::lists::reset;
+use crate::shallow::columns::grid::check_cells;
 use crate::shallow::columns::{Columns, STRIP, Strip};
 use crate::shallow::surface::quartets::links::{Scene, find_above};
 
@@ -159,13 +161,7 @@ impl Lifts {
         {
             return Err(Error::argument(format!("a distance of {bad} cells is not finite and 0 or more")));
         }
-        if [0, 1].into_iter().any(|axis| cells[axis].start > cells[axis].end || cells[axis].end > size[axis])
-        {
-            let ([x, z], [nx, nz]) = (cells, size);
-            return Err(Error::argument(format!(
-                "cells {x:?} x {z:?} are not a box within {nx} x {nz} cells"
-            )));
-        }
+        check_cells(&cells, size)?;
         // Quartets with a cell of the box extend one cell further.
         let cells = [0, 1].map(|axis| {
             let Range { start, end } = cells[axis];
@@ -200,12 +196,10 @@ impl Lifts {
         std::mem::swap(least, &mut old.0);
         std::mem::swap(sunk, &mut old.1);
         std::mem::swap(strips, &mut old.2);
-        strips.clear();
-        strips.extend_from_slice(now);
+        now.clone_into(strips);
         let mut before = 0;
         for numbers in [&mut *least, &mut *sunk] {
-            numbers.clear();
-            numbers.resize(columns.len(), 0);
+            reset(numbers, columns.len(), 0);
         }
         for (strip, position) in now.iter().enumerate() {
             before += old.2[before..].iter().take_while(|other| *other < position).count();
@@ -224,8 +218,7 @@ impl Area<'_> {
         if let Some(bad) = positions.iter().position(|p| !p.iter().all(|length| length.is_finite())) {
             return Err(Error::argument(format!("vertex {bad} of the terrain is not finite")));
         }
-        facing.clear();
-        facing.resize(positions.len(), 0.0);
+        reset(facing, positions.len(), 0.0);
         let grid = self.scene.columns.grid;
         let [x, z] = [0, 1].map(|axis| {
             let Range { start, end } = self.cells[axis];

@@ -2,6 +2,7 @@
 //! surface is hidden under the ground; in between, the height follows the depth.
 
 use crate::numeric::cpu::dispatch;
+use crate::numeric::lists::reset;
 use crate::shallow::columns::grid::TOP;
 use crate::shallow::columns::{Columns, STRIP};
 use crate::shallow::columns::{strip_mut, strip_of};
@@ -23,8 +24,7 @@ struct Rule<'a> {
 /// Reserves memory for the heights of columns.
 pub(in crate::shallow::surface) fn reserve(columns: &Columns, heights: &mut Vec<i32>) {
     if heights.len() != columns.len() {
-        heights.clear();
-        heights.resize(columns.len(), 0);
+        reset(heights, columns.len(), 0);
     }
 }
 

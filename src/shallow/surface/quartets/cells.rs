@@ -2,6 +2,7 @@
 
 use super::links::Scene;
 use super::strips::Found;
+use crate::numeric::lists::refill;
 use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::surface::rim::boundary::{Wall, walls_of};
 
@@ -83,8 +84,7 @@ impl Cells {
                 find_layers(scene, [row, at + 1], east);
             }
         }
-        self.full.clear();
-        self.full.extend(self.rows[0].strips[0].iter().map(|&strip| found.states[strip].full));
+        refill(&mut self.full, self.rows[0].strips[0].iter().map(|&strip| found.states[strip].full));
         let cells = u32::from(quartets) | u32::from(quartets) << 1;
         self.rows.iter_mut().for_each(|row| row.take(scene, found, walls, cells));
     }
@@ -105,8 +105,7 @@ impl Cells {
 
 /// Finds the strips of a block by layer.
 fn find_layers(scene: Scene<'_>, at: [usize; 2], out: &mut Vec<usize>) {
-    out.clear();
-    out.extend(std::iter::successors(scene.lowest(at), |&strip| scene.above(strip)));
+    refill(out, std::iter::successors(scene.lowest(at), |&strip| scene.above(strip)));
 }
 
 impl Row {

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::numeric::lists::refill;
 use crate::shallow::columns::{Columns, NONE, STRIP, Strip};
 
 /// The eight cells around one, from the east through the north: steps along x and z.
@@ -135,12 +136,14 @@ pub(in crate::shallow::surface) fn cell_at([x, z]: [usize; 2], [dx, dz]: [i32; 2
 pub(in crate::shallow::surface) fn find_above(columns: &Columns, out: &mut Vec<u32>) {
     let strips = columns.strips();
     let across = columns.grid.size[0].div_ceil(STRIP);
-    out.clear();
-    out.extend(strips.iter().enumerate().map(|(strip, own)| {
-        let wanted = Strip { layer: own.layer + 1, ..*own };
-        let behind = &strips[strip + 1..strips.len().min(strip + across + 2)];
-        (strip + 1 + behind.partition_point(|other| *other < wanted)) as u32
-    }));
+    refill(
+        out,
+        strips.iter().enumerate().map(|(strip, own)| {
+            let wanted = Strip { layer: own.layer + 1, ..*own };
+            let behind = &strips[strip + 1..strips.len().min(strip + across + 2)];
+            (strip + 1 + behind.partition_point(|other| *other < wanted)) as u32
+        }),
+    );
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! State of strips in a frame, one bit per position.
 
+use crate::numeric::lists::reset;
 use crate::shallow::columns::{Columns, NONE, STRIP};
 
 /// State of a strip, one bit per position.
@@ -54,8 +55,7 @@ pub(in crate::shallow::surface) struct Bits(Vec<u64>);
 impl Bits {
     /// Clears the set, for indices below `count`.
     pub fn reset(&mut self, count: usize) {
-        self.0.clear();
-        self.0.resize(count.div_ceil(64), 0);
+        reset(&mut self.0, count.div_ceil(64), 0);
     }
 
     #[inline(always)]
@@ -154,10 +154,8 @@ impl Found {
             spans.iter().for_each(|span| states[span.first..span.first + span.len].fill(State::default()));
             odd.iter().for_each(|block| blocks[block] = Block::default());
         } else {
-            states.clear();
-            states.resize(strips + 1, State::default());
-            blocks.clear();
-            blocks.resize(across * nz, Block::default());
+            reset(states, strips + 1, State::default());
+            reset(blocks, across * nz, Block::default());
         }
         spans.clear();
         spans.reserve(strips);

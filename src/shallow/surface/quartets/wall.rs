@@ -2,6 +2,7 @@
 
 use super::cells::{Cells, Entry};
 use super::divide::{OTHERS, divide, three};
+use crate::numeric::lists::reset;
 use crate::shallow::columns::NONE;
 use crate::shallow::surface::rim::boundary::Wall;
 
@@ -45,8 +46,7 @@ impl Walled {
     fn clear(&mut self, entries: usize) {
         self.words = entries.div_ceil(WORD);
         for bits in [&mut self.members, &mut self.of_column, &mut self.links] {
-            bits.clear();
-            bits.resize(entries * self.words, 0);
+            reset(bits, entries * self.words, 0);
         }
     }
 

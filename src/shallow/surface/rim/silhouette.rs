@@ -1,6 +1,7 @@
 //! Where the ground of a mesh ends between the middles of the cells: on each side of a column at which films end, how far its triangles
 //! reach along the line to the middle of the next cell, and how high they are there.
 
+use crate::numeric::lists::{refill, reset};
 use crate::shallow::surface::rim::hem::Hem;
 use std::ops::Range;
 
@@ -83,16 +84,15 @@ impl Silhouette {
     fn find_ends_of_films(&mut self, columns: &Columns) -> Result<()> {
         let Self { film, films, hems, .. } = self;
         let (bases, ceilings) = (columns.bases(), columns.ceilings());
-        film.clear();
-        film.extend(
+        refill(
+            film,
             (0..columns.len())
                 .map(|index| i32::from(columns.is_column(index) && ceilings[index] > bases[index])),
         );
         let mut ledges = Ledges::default();
         ledges.find(columns);
         films.count(columns, &Depths { depth: film, ledges: Some(&ledges), ..Depths::default() })?;
-        hems.clear();
-        hems.extend_from_slice(films.skirts.hems());
+        films.skirts.hems().clone_into(hems);
         Ok(())
     }
 
@@ -104,8 +104,7 @@ impl Silhouette {
             let [x, z] = cell(hem);
             (z, x, hem.column)
         });
-        ends.clear();
-        ends.resize(hems.len(), [None; 4]);
+        reset(ends, hems.len(), [None; 4]);
         crowd.count(columns.grid.size, hems.iter().map(cell));
     }
 
@@ -114,8 +113,7 @@ impl Silhouette {
             let along = (f64::from(at) - grid.origin[axis]) / grid.cell - 0.5;
             along.floor().clamp(-2.0, grid.size[axis] as f64) as i32
         };
-        self.cells.clear();
-        self.cells.extend(positions.iter().map(|at| [position(0, at.x), position(1, at.z)]));
+        refill(&mut self.cells, positions.iter().map(|at| [position(0, at.x), position(1, at.z)]));
     }
 
     /// Finds how far a triangle reaches from the hems of a box of cells.
@@ -167,8 +165,7 @@ impl Crowd {
     fn count(&mut self, [nx, nz]: [usize; 2], hems: impl Iterator<Item = [usize; 2]>) {
         let across = nx + 1;
         self.size = [nx, nz];
-        self.before.clear();
-        self.before.resize(across * (nz + 1), 0);
+        reset(&mut self.before, across * (nz + 1), 0);
         for [x, z] in hems {
             self.before[(z + 1) * across + x + 1] += 1;
         }

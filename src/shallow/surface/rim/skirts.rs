@@ -4,6 +4,7 @@
 //! other edges are known to be closed, so few are examined.
 
 use super::ledges::Ledges;
+use crate::numeric::lists::reset;
 use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::surface::buffers::vertices::Vertices;
 use crate::shallow::surface::quartets::links::{RING, Scene, cell_at};
@@ -44,10 +45,8 @@ impl Skirts {
         let Self { edges, ways, open, hems, positions, .. } = self;
         let Some(ledges) = ledges else { return [0; 2] };
         if ways.len() != len {
-            ways.clear();
-            ways.resize(len, 0);
-            positions.clear();
-            positions.resize(len, NONE);
+            reset(ways, len, 0);
+            reset(positions, len, NONE);
         }
         // For the same count of columns nothing is allocated again: a column has at most eight directions.
         edges.reserve(8 * ledges.most);

@@ -51,9 +51,8 @@ impl Surface {
         self.indices.clear();
         self.indices.reserve(surface::bound(&detail.coarse.columns).indices);
         let [sewn, triangles] = stitches::bound(detail);
-        let layers =
-            liquids.map(|liquid| liquid.columns.strips().iter().map(|strip| strip.layer as usize + 1).max());
-        self.stitches.reserve(triangles, layers.into_iter().flatten().max().unwrap_or(0));
+        let [fine, coarse] = liquids.map(|liquid| liquid.columns.layers());
+        self.stitches.reserve(triangles, fine.max(coarse));
         self.sewn.reserve(sewn, triangles);
     }
 

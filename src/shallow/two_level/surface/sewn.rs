@@ -2,12 +2,13 @@
 //! and of dry ones beside liquid that ends there.
 
 use super::stitches::Stitches;
+use crate::numeric::lists::{refill, reset};
 use crate::shallow::columns::Columns;
 use crate::shallow::scalars::MOST;
+use crate::shallow::surface::buffers::frame::{Frame, Vertex};
 use crate::shallow::surface::buffers::normals::upright;
-use crate::shallow::surface::buffers::vertices::SURFACE_SPEED;
 use crate::shallow::surface::heights::shown::height_of;
-use crate::shallow::surface::{Depths, Layout, Target, Up};
+use crate::shallow::surface::{Depths, Layout, Target};
 use crate::shallow::two_level::Detail;
 
 /// Source data of these vertices.
@@ -122,22 +123,23 @@ impl Sewn {
     /// A wet column has its own height, a dry one the mean of those around, but not above its ground.
     fn find_heights(&mut self, all: Columnar<'_>, sewn: &[u32]) {
         let mut heights = std::mem::take(&mut self.heights);
-        heights.clear();
-        heights.extend(sewn.iter().enumerate().map(|(at, &id)| {
-            let (own, partners) = (f64::from(all.height(id)), self.partners(at));
-            if all.depth(id) > 0 || partners.len() == 0 {
-                return own;
-            }
-            let count = partners.len() as f64;
-            own.min(partners.map(|id| i64::from(all.height(id))).sum::<i64>() as f64 / count)
-        }));
+        refill(
+            &mut heights,
+            sewn.iter().enumerate().map(|(at, &id)| {
+                let (own, partners) = (f64::from(all.height(id)), self.partners(at));
+                if all.depth(id) > 0 || partners.len() == 0 {
+                    return own;
+                }
+                let count = partners.len() as f64;
+                own.min(partners.map(|id| i64::from(all.height(id))).sum::<i64>() as f64 / count)
+            }),
+        );
         self.heights = heights;
     }
 
     /// Sums the normals of triangles, weighted by area, at each vertex.
     fn find_slopes(&mut self, all: Columnar<'_>, stitches: &Stitches) {
-        self.slopes.clear();
-        self.slopes.resize(stitches.sewn.len(), [0.0; 3]);
+        reset(&mut self.slopes, stitches.sewn.len(), [0.0; 3]);
         let fine = &all.detail.fine.columns;
         let unit = fine.heights.unit / fine.grid.cell;
         for triangle in &stitches.triangles {
@@ -164,25 +166,9 @@ impl Sewn {
     /// Writes one vertex.
     fn put(&self, all: Columnar<'_>, at: usize, id: u32, target: &mut Target<'_>) {
         let (columns, _, index) = all.of(id);
-        let Columnar { layout, .. } = all;
-        let (grid, heights) = (columns.grid, columns.heights);
-        let (scale, depth) = (layout.scale, all.depth(id));
-        let sign = if layout.left_handed == (layout.up == Up::Y) { -1.0 } else { 1.0 };
-        let put = |out: &mut Option<&mut [f32]>, [x, up, z]: [f32; 3]| {
-            if let Some(out) = out {
-                let z = z * sign;
-                out[3 * at..][..3].copy_from_slice(&if layout.up == Up::Z { [x, z, up] } else { [x, up, z] });
-            }
-        };
-        let cell = columns.cell(index);
-        let centre = |axis: usize| {
-            let [first, cell_edge] = [grid.centre([0, 0])[axis], grid.cell].map(|of| (of * scale) as f32);
-            first + cell[axis] as f32 * cell_edge
-        };
-        let height = (heights.low * scale) as f32 + self.heights[at] as f32 * (heights.unit * scale) as f32;
-        put(&mut target.positions, [centre(0), height, centre(1)]);
+        let (frame, depth) = (Frame::of(columns, all.layout), all.depth(id));
+        let [column, row] = columns.cell(index).map(|at| at as i32);
         let [x, y, z] = self.slopes[at];
-        put(&mut target.normals, upright((x / y) as f32, (z / y) as f32));
         let mean = |of: &dyn Fn(u32) -> f32| {
             let count = self.partners(at).len().max(1) as f64;
             if depth > 0 {
@@ -191,21 +177,18 @@ impl Sewn {
                 (self.partners(at).map(|id| f64::from(of(id))).sum::<f64>() / count) as f32
             }
         };
-        let [u, w] = [0, 1].map(|axis| mean(&|id| all.velocity(id)[axis]) * (SURFACE_SPEED * scale as f32));
-        put(&mut target.velocities, [u, 0.0, w]);
-        if let Some(out) = &mut target.depths {
-            out[at] = depth as f32 * (heights.unit * scale) as f32;
-        }
-        if let Some(out) = &mut target.opacities {
-            out[at] = (depth as f32 * (heights.unit / layout.opaque_depth) as f32).min(1.0);
-        }
-        for (scalar, out) in target.carried.iter_mut().enumerate() {
-            if let Some(out) = out {
-                out[at] = mean(&|id| all.carried(id)[scalar]);
-            }
-        }
-        if let Some(out) = &mut target.layers {
-            out[at] = columns.layer(index) as u32;
-        }
+        let vertex = Vertex {
+            position: [frame.centre(0, column), frame.height(self.heights[at] as f32), frame.centre(1, row)],
+            normal: upright((x / y) as f32, (z / y) as f32),
+            velocity: [0, 1].map(|axis| mean(&|id| all.velocity(id)[axis])),
+            carried: std::array::from_fn(|scalar| match target.carried[scalar] {
+                Some(_) => mean(&|id| all.carried(id)[scalar]),
+                None => 0.0,
+            }),
+            depth,
+            layer: columns.layer(index) as u32,
+            column: id,
+        };
+        frame.put(at, &vertex, target);
     }
 }

@@ -1,5 +1,6 @@
 //! The strip between fine and coarse cells: its triangles.
 
+use crate::numeric::lists::refill;
 use crate::shallow::Shallow;
 use crate::shallow::columns::NONE;
 use crate::shallow::surface::Counts;
@@ -60,8 +61,7 @@ impl Stitches {
         let Self { triangles, indices, sewn, corners } = self;
         each_piece(detail, |piece| {
             for (corner, cell) in corners.iter_mut().zip(piece) {
-                corner.clear();
-                corner.extend(cell.into_iter().flat_map(|cell| entries(detail, depths, cell)));
+                refill(corner, cell.into_iter().flat_map(|cell| entries(detail, depths, cell)));
             }
             join(corners, triangles);
         });

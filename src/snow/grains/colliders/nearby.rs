@@ -6,6 +6,7 @@ use super::shell::{Best, Nearest, Shell};
 use crate::geometry::DVec3;
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::{LANES, Lanes};
+use crate::snow::grains::solver::rows::{dot, scaled, sub};
 
 /// The leaves of a mesh near some positions.
 #[derive(Default)]
@@ -171,11 +172,11 @@ fn prepared(corners: &[[Lanes; 3]; 3]) -> Triangles {
 
 #[inline(always)]
 fn prepare([a, b, c]: &[[Lanes; 3]; 3]) -> Triangles {
-    let (ab, ac, bc) = (minus(b, a), minus(c, a), minus(c, b));
+    let (ab, ac, bc) = (sub(*b, *a), sub(*c, *a), sub(*c, *b));
     let one = Lanes::all(1.0);
-    let (d00, d01, d11) = (dot(&ab, &ab), dot(&ab, &ac), dot(&ac, &ac));
+    let (d00, d01, d11) = (dot(ab, ab), dot(ab, ac), dot(ac, ac));
     let across = cross(&ab, &ac);
-    let square = dot(&across, &across);
+    let square = dot(across, across);
     // A triangle without area has weights of NaN, so no point is inside it.
     let inverse = one / square;
     let length = one / square.sqrt();
@@ -184,9 +185,9 @@ fn prepare([a, b, c]: &[[Lanes; 3]; 3]) -> Triangles {
     Triangles {
         corner: *a,
         sides: [ab, ac],
-        inverse: [one / d00.max(tiny), one / d11.max(tiny), one / dot(&bc, &bc).max(tiny)],
+        inverse: [one / d00.max(tiny), one / d11.max(tiny), one / dot(bc, bc).max(tiny)],
         weights: [weight(&ab, d11, &ac, d01, inverse), weight(&ac, d00, &ab, d01, inverse)],
-        normal: [across[0] * length, across[1] * length, across[2] * length],
+        normal: scaled(across, length),
         error: 0.0,
     }
 }
@@ -201,12 +202,12 @@ fn squares_of(triangles: &Triangles, position: [f32; 3]) -> Lanes {
     let Triangles { corner, sides: [ab, ac], inverse, weights, normal, .. } = triangles;
     let position = [Lanes::all(position[0]), Lanes::all(position[1]), Lanes::all(position[2])];
     let (zero, one) = (Lanes::all(0.0), Lanes::all(1.0));
-    let from = minus(&position, corner);
+    let from = sub(position, *corner);
     let (first, second) = (side(&from, ab, inverse[0]), side(&from, ac, inverse[1]));
-    let third = side(&minus(&from, ab), &minus(ac, ab), inverse[2]);
+    let third = side(&sub(from, *ab), &sub(*ac, *ab), inverse[2]);
     let outside = first.min(second).min(third);
-    let height = dot(&from, normal);
-    let (v, w) = (dot(&from, &weights[0]), dot(&from, &weights[1]));
+    let height = dot(from, *normal);
+    let (v, w) = (dot(from, weights[0]), dot(from, weights[1]));
     let is_inside = zero.is_less(v) & zero.is_less(w) & (v + w).is_less(one);
     is_inside.choose(height * height, outside)
 }
@@ -220,29 +221,15 @@ fn weight(
     of_both: Lanes,
     inverse: Lanes,
 ) -> [Lanes; 3] {
-    [
-        (of_other * side[0] - of_both * other[0]) * inverse,
-        (of_other * side[1] - of_both * other[1]) * inverse,
-        (of_other * side[2] - of_both * other[2]) * inverse,
-    ]
+    scaled(sub(scaled(*side, of_other), scaled(*other, of_both)), inverse)
 }
 
 /// Squared distances (m2) of edges from positions relative to the start of each edge.
 #[inline(always)]
 fn side(position: &[Lanes; 3], side: &[Lanes; 3], inverse: Lanes) -> Lanes {
-    let along = (dot(position, side) * inverse).max(Lanes::all(0.0)).min(Lanes::all(1.0));
-    let off = [position[0] - along * side[0], position[1] - along * side[1], position[2] - along * side[2]];
-    dot(&off, &off)
-}
-
-#[inline(always)]
-fn minus(a: &[Lanes; 3], b: &[Lanes; 3]) -> [Lanes; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-#[inline(always)]
-fn dot(a: &[Lanes; 3], b: &[Lanes; 3]) -> Lanes {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    let along = (dot(*position, *side) * inverse).max(Lanes::all(0.0)).min(Lanes::all(1.0));
+    let off = sub(*position, scaled(*side, along));
+    dot(off, off)
 }
 
 #[inline(always)]

@@ -4,7 +4,7 @@ use super::density::SURROUNDED;
 use super::pairs::Batch;
 use super::rest;
 use super::rest::Rest;
-use super::rows::{Part, Row, SUPPORTED, Shared, V};
+use super::rows::{Part, Row, SUPPORTED, Shared, V, add, dot, scaled, sub};
 use crate::numeric::lanes::{LaneMask, Lanes};
 
 /// Share of an overlap that a sub-step removes.
@@ -31,26 +31,6 @@ const LEAST: f32 = 1.0e-6;
 pub const STEEP: f32 = 0.2;
 
 type V8 = [Lanes; 3];
-
-#[inline(always)]
-fn add8(a: V8, b: V8) -> V8 {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-}
-
-#[inline(always)]
-fn sub8(a: V8, b: V8) -> V8 {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-#[inline(always)]
-fn scaled8(a: V8, s: Lanes) -> V8 {
-    [a[0] * s, a[1] * s, a[2] * s]
-}
-
-#[inline(always)]
-fn dot8(a: V8, b: V8) -> Lanes {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
 
 /// Eight grains of a batch.
 #[derive(Clone, Copy)]
@@ -92,7 +72,7 @@ impl Eight {
     /// Applies an impulse.
     #[inline(always)]
     fn kicked(self, impulse: V8, weight: Lanes) -> Self {
-        Self { velocity: add8(self.velocity, scaled8(impulse, weight)), ..self }
+        Self { velocity: add(self.velocity, scaled(impulse, weight)), ..self }
     }
 }
 
@@ -119,13 +99,13 @@ impl Contact {
         let weights = a.weight + b.weight;
         // 1 / weights, exact for 1 and 2.
         let inverse = Lanes::all(1.5) - Lanes::all(0.5) * weights;
-        let apart = sub8(sub8(a.position, batch.shift()), b.position);
-        let distance = dot8(apart, apart).sqrt();
-        let [x, y, z] = scaled8(apart, one / distance.max(Lanes::all(LEAST)));
+        let apart = sub(sub(a.position, batch.shift()), b.position);
+        let distance = dot(apart, apart).sqrt();
+        let [x, y, z] = scaled(apart, one / distance.max(Lanes::all(LEAST)));
         // Two grains at the same position separate vertically.
         let is_none = distance.is_less(Lanes::all(LEAST));
         let normal = [is_none.choose(zero, x), is_none.choose(one, y), is_none.choose(zero, z)];
-        let upward = dot8(normal, c.up.map(Lanes::all));
+        let upward = dot(normal, c.up.map(Lanes::all));
         let lighter = Lanes::all(if c.attraction > 0.0 { 0.0 } else { LIGHTER_ABOVE });
         // Resting grains have infinite mass.
         let tilt = upward * lighter * a.weight * b.weight;
@@ -148,8 +128,8 @@ pub fn collide(a: Eight, b: Eight, batch: &mut Batch, c: &Coefficients) -> (Eigh
     let (zero, one) = (Lanes::all(0.0), Lanes::all(1.0));
     let contact = Contact::between(&a, &b, batch, c);
     let Contact { normal, gap, weights, inverse, .. } = contact;
-    let relative = sub8(a.velocity, b.velocity);
-    let along = dot8(relative, normal);
+    let relative = sub(a.velocity, b.velocity);
+    let along = dot(relative, normal);
     let closing = |gap: Lanes| zero - gap.max(zero) * Lanes::all(c.diameter / c.dt);
     let (least, wanted) = if c.attraction > 0.0 {
         let attracts = gap.is_less(Lanes::all(c.band));
@@ -159,22 +139,22 @@ pub fn collide(a: Eight, b: Eight, batch: &mut Batch, c: &Coefficients) -> (Eigh
         (zero, closing(gap - Lanes::all(SLACK)))
     };
     let before = batch.impulse;
-    let before_along = dot8(before, normal);
+    let before_along = dot(before, normal);
     let total = (before_along + (wanted - along) * inverse).max(least);
-    let sliding = sub8(relative, scaled8(normal, along));
-    let across = sub8(sub8(before, scaled8(normal, before_along)), scaled8(sliding, inverse));
-    let slides = Lanes::all(c.slides).is_less(dot8(sliding, sliding));
+    let sliding = sub(relative, scaled(normal, along));
+    let across = sub(sub(before, scaled(normal, before_along)), scaled(sliding, inverse));
+    let slides = Lanes::all(c.slides).is_less(dot(sliding, sliding));
     let friction = slides.choose(Lanes::all(c.friction_of_sliding), Lanes::all(c.friction));
     let most = friction * (total - least);
-    let square = dot8(across, across);
+    let square = dot(across, across);
     let exceeds = (most * most).is_less(square);
     let share = exceeds.choose(most / square.sqrt().max(Lanes::all(1.0e-30)), one);
-    let impulse = add8(scaled8(normal, total), scaled8(across, share));
+    let impulse = add(scaled(normal, total), scaled(across, share));
     let moves = zero.is_less(weights);
     for (axis, impulse) in impulse.into_iter().enumerate() {
         batch.impulse[axis] = moves.choose(impulse, before[axis]);
     }
-    let change = sub8(batch.impulse, before);
+    let change = sub(batch.impulse, before);
     let (a, b) = contact.kick(a, b, change);
     (a, b, contact)
 }
@@ -191,12 +171,12 @@ impl Contact {
         c: &Coefficients,
     ) -> (Eight, Eight) {
         let zero = Lanes::all(0.0);
-        let stopped = dot8(*impulse, self.normal) * self.weights;
+        let stopped = dot(*impulse, self.normal) * self.weights;
         let closing = self.gap.max(zero) * Lanes::all(c.diameter / c.dt);
         let approach = stopped + closing;
         let meets = zero.is_less(stopped) & Lanes::all(c.bouncing).is_less(approach);
         let wanted = is_held.choose(zero, meets.choose(approach * Lanes::all(c.restitution) + closing, zero));
-        let change = scaled8(self.normal, wanted * self.inverse);
+        let change = scaled(self.normal, wanted * self.inverse);
         self.kick(a, b, change)
     }
 
@@ -213,14 +193,14 @@ impl Contact {
         let slop = Lanes::all(if c.attraction > 0.0 { SLOP_OF_WALLS } else { SLOP });
         let some = ((overlap - slop).max(zero) * Lanes::all(REMOVED)).min(Lanes::all(FARTHEST));
         let removed = zero.is_less(self.gap).choose(overlap, some);
-        let missing = removed - dot8(sub8(a_push, b_push), self.normal);
+        let missing = removed - dot(sub(a_push, b_push), self.normal);
         let is_up = zero.is_less(upward);
         let (a_holds, b_holds) = (a.supported.choose(one, zero), b.supported.choose(one, zero));
         let share = upward * is_up.choose(b_holds, a_holds) * a.weight * b.weight;
         let amount = (zero.is_less(missing) & moves).choose(missing * self.inverse, zero);
-        let push = scaled8(self.normal, amount);
-        let [ax, ay, az] = add8(a_push, scaled8(push, a.weight * (one + share)));
-        let [bx, by, bz] = sub8(b_push, scaled8(push, b.weight * (one - share)));
+        let push = scaled(self.normal, amount);
+        let [ax, ay, az] = add(a_push, scaled(push, a.weight * (one + share)));
+        let [bx, by, bz] = sub(b_push, scaled(push, b.weight * (one - share)));
         // Support spreads upward along chains of contacts that begin at something fixed.
         let (half, woken) = (Lanes::all(0.5), Lanes::all(rest::WOKEN));
         let (a_rests, b_rests) = (a.weight.is_less(half), b.weight.is_less(half));

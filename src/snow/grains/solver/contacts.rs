@@ -14,6 +14,7 @@ use super::pairs::{Batch, Held, INDEX, other};
 use super::rows::{Row, V, norm, sub};
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::{LANES, Lanes};
+use crate::numeric::lists::reset;
 
 /// Maximum number of grains.
 pub const MOST: usize = 1 << INDEX;
@@ -266,8 +267,7 @@ fn find_in(scratch: &mut Scratch, blocks: &[Block], index: usize) {
     scratch.starts.clear();
     scratch.starts.push(0);
     scratch.pairs.clear();
-    scratch.behind.clear();
-    scratch.behind.resize(total as usize, 0);
+    reset(&mut scratch.behind, total as usize, 0);
     let mut runs: Vec<Run<'_>> = Vec::with_capacity(16);
     for cell in 0..ALL_CELLS {
         let own = block.starts[cell]..block.starts[cell + 1];

@@ -12,6 +12,7 @@ use super::pairs::{Batch, Held, SKIN, THIN_SKIN};
 use super::rows::{Row, Shared, V, add, dot, norm, scaled};
 use crate::geometry::DVec3;
 use crate::numeric::lanes::LANES;
+use crate::numeric::lists::{refill, reset};
 
 /// A grain that has left its block.
 struct Mover {
@@ -233,22 +234,22 @@ impl Layout {
                     [0, 1, 2].map(|axis: usize| block.anchors[axis][member])
                 }
             };
-            positions.clear();
-            positions.extend(block.members.iter().enumerate().map(|(member, &slot)| {
-                let position = position(member, slot);
-                (position, cell(position) as u32)
-            }));
+            refill(
+                positions,
+                block.members.iter().enumerate().map(|(member, &slot)| {
+                    let position = position(member, slot);
+                    (position, cell(position) as u32)
+                }),
+            );
             // A counting sort by cell, then the few of a cell by identity.
             let mut starts = [0u32; ALL_CELLS + 1];
             positions.iter().for_each(|(_, cell)| starts[*cell as usize + 1] += 1);
             (0..ALL_CELLS).for_each(|cell| starts[cell + 1] += starts[cell]);
             let mut next = starts;
             let count = positions.len();
-            members.clear();
-            members.resize(count, 0);
+            reset(members, count, 0);
             block.anchors.iter_mut().for_each(|anchors| {
-                anchors.clear();
-                anchors.resize(count + LANES, f32::INFINITY);
+                reset(anchors, count + LANES, f32::INFINITY);
             });
             let [xs, ys, zs] = &mut block.anchors;
             for ((position, cell), &slot) in positions.iter().zip(&block.members) {

@@ -1,6 +1,7 @@
 //! The part of a grain that every sub-step reads and writes, and how tasks that change disjoint grains share it.
 
 use std::marker::PhantomData;
+use std::ops::{Add, Mul, Sub};
 
 use crate::numeric::lanes::{LANES, Lanes};
 
@@ -191,26 +192,26 @@ impl Shared<'_, Row> {
 
 /// a + b.
 #[inline(always)]
-pub fn add(a: V, b: V) -> V {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+pub fn add<T: Add<Output = T>>([a, b, c]: [T; 3], [x, y, z]: [T; 3]) -> [T; 3] {
+    [a + x, b + y, c + z]
 }
 
 /// a - b.
 #[inline(always)]
-pub fn sub(a: V, b: V) -> V {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+pub fn sub<T: Sub<Output = T>>([a, b, c]: [T; 3], [x, y, z]: [T; 3]) -> [T; 3] {
+    [a - x, b - y, c - z]
 }
 
 /// s a.
 #[inline(always)]
-pub fn scaled(a: V, s: f32) -> V {
-    [a[0] * s, a[1] * s, a[2] * s]
+pub fn scaled<T: Copy + Mul<Output = T>>([a, b, c]: [T; 3], s: T) -> [T; 3] {
+    [a * s, b * s, c * s]
 }
 
 /// a . b.
 #[inline(always)]
-pub fn dot(a: V, b: V) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+pub fn dot<T: Add<Output = T> + Mul<Output = T>>([a, b, c]: [T; 3], [x, y, z]: [T; 3]) -> T {
+    a * x + b * y + c * z
 }
 
 /// |a|.

@@ -84,14 +84,20 @@ fn sweep(rows: &mut [Row], layout: &mut Layout, colour: &[u32], pass: Pass, c: &
             }
             let touches = &mut block.touches;
             match pass {
-                Pass::Begin => begin(rows, batches, c),
+                Pass::Begin => {
+                    dispatch!(begin_batches(rows: Shared<'_, Row>, batches: &[Batch], c: &Coefficients));
+                }
                 Pass::Solve => {
                     resist_all(rows, touches, false, c);
-                    solve(rows, batches, c);
+                    dispatch!(solve_batches::<false>(
+                        rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients
+                    ));
                 }
                 Pass::SolveLast => {
                     resist_all(rows, touches, true, c);
-                    solve_last(rows, batches, c);
+                    dispatch!(solve_batches::<true>(
+                        rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients
+                    ));
                 }
             }
         }
@@ -275,18 +281,6 @@ fn bounded(vector: V, most: f32) -> V {
     if square > most * most { scaled(vector, most / square.sqrt()) } else { vector }
 }
 
-fn begin(rows: Shared<'_, Row>, batches: &[Batch], c: &Coefficients) {
-    dispatch!(begin_batches(rows: Shared<'_, Row>, batches: &[Batch], c: &Coefficients))
-}
-
-fn solve(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients) {
-    dispatch!(solve_batches(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients))
-}
-
-fn solve_last(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients) {
-    dispatch!(solve_batches_last(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients))
-}
-
 /// Applies the impulses of the last sub-step.
 #[inline(always)]
 fn begin_batches(rows: Shared<'_, Row>, batches: &[Batch], c: &Coefficients) {
@@ -306,24 +300,9 @@ fn begin_batches(rows: Shared<'_, Row>, batches: &[Batch], c: &Coefficients) {
     }
 }
 
+/// Corrects the impulses; in the last sweep of a sub-step also computes pushes.
 #[inline(always)]
-fn solve_batches(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients) {
-    for index in 0..batches.len() {
-        prefetch(rows, batches.get(index + AHEAD));
-        let batch = &mut batches[index];
-        let others = batch.others();
-        // SAFETY: as in `begin_batches`.
-        unsafe {
-            let (a, b) = (Eight::load(rows, &batch.owners), Eight::load(rows, &others));
-            let (a, b, ..) = collide(a, b, batch, c);
-            a.store(rows, &batch.owners);
-            b.store(rows, &others);
-        }
-    }
-}
-
-#[inline(always)]
-fn solve_batches_last(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients) {
+fn solve_batches<const LAST: bool>(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients) {
     for index in 0..batches.len() {
         prefetch(rows, batches.get(index + AHEAD));
         let batch = &mut batches[index];
@@ -332,6 +311,11 @@ fn solve_batches_last(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coeffici
         unsafe {
             let (a, b) = (Eight::load(rows, &batch.owners), Eight::load(rows, &others));
             let (mut a, mut b, contact) = collide(a, b, batch, c);
+            if !LAST {
+                a.store(rows, &batch.owners);
+                b.store(rows, &others);
+                continue;
+            }
             // Two grains that collide in the air then separate: their impulse is a poor guess for the next sub-step.
             let mut is_held = a.supported & b.supported;
             is_held = is_held | (a.supported | b.supported) & contact.gap.is_less(Lanes::all(TOUCHING));

@@ -137,22 +137,13 @@ impl Matching {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
     use crate::geometry::DVec3;
+    use crate::geometry::coords::between;
+    use crate::surface::test_particles::context;
 
     const SOLVERS: [Solver; 2] = [Solver::Sor, Solver::Gradients];
     /// Extent of the grid of two balls from the origin on each axis (cells).
     const HALF: [i32; 3] = [26, 18, 18];
-
-    fn context(threads: usize) -> Context {
-        Context::new(Pool::new(threads).unwrap())
-    }
-
-    /// Positions of a box, ascending.
-    fn each(low: [i32; 3], high: [i32; 3]) -> impl Iterator<Item = [i32; 3]> {
-        let on = move |axis: usize| low[axis]..=high[axis];
-        on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z])))
-    }
 
     fn matching(solver: Solver, tolerance: f64, reach: i32) -> Matching {
         Matching { solver, tolerance, reach, most: 5000, omega: None }
@@ -178,7 +169,7 @@ mod tests {
                 is_flagged,
             }
         };
-        each(HALF.map(|x| -x), HALF).map(node).collect()
+        between(HALF.map(|x| -x), HALF).map(node).collect()
     }
 
     /// Index of a position in the grid of two balls.
@@ -213,7 +204,7 @@ mod tests {
             position.into_iter().map(|x| x as u32).fold(mix(salt, 77), mix).wrapping_mul(0x85eb_ca6b) >> 8
         };
         let value = |position, salt| (random(position, salt) % 6000) as f32 / 1000.0 - 3.0;
-        each([-9, -7, -5], [12, 8, 9])
+        between([-9, -7, -5], [12, 8, 9])
             .filter(|position| !random(*position, 1).is_multiple_of(7))
             .map(|position| Node {
                 position,
@@ -240,7 +231,7 @@ mod tests {
             let phi = (position[0] * 3 + position[1] * 5 + position[2]) as f32 / 8.0 % 1.0;
             Node { position, gamma: if is_flagged { 3.0 } else { phi + psi(position[0]) }, phi, is_flagged }
         };
-        each([0; 3], [12, 4, 3]).map(node).collect()
+        between([0; 3], [12, 4, 3]).map(node).collect()
     }
 
     #[test]
@@ -355,7 +346,7 @@ mod tests {
             let phi = height.min(drop).clamp(-4.0, 4.0) as f32;
             Node { position, gamma: height.clamp(-3.0, 3.0) as f32, phi, is_flagged }
         };
-        let nodes: Vec<Node> = each([-14, -12, -12], [18, 12, 14]).map(node).collect();
+        let nodes: Vec<Node> = between([-14, -12, -12], [18, 12, 14]).map(node).collect();
         for solver in SOLVERS {
             let out = match_topology(&context(1), &nodes, &matching(solver, 1e-4, 8)).unwrap();
             let mut counts = [0; 2];
@@ -395,11 +386,11 @@ mod tests {
 
     #[test]
     fn free_nodes_without_a_fixed_one_take_phi() {
-        let island = each([20, 0, 0], [22, 2, 2]).map(|position| {
+        let island = between([20, 0, 0], [22, 2, 2]).map(|position| {
             let phi = 0.25 * (position[0] - 21) as f32 + 0.5 * position[1] as f32;
             Node { position, gamma: -1.0, phi, is_flagged: true }
         });
-        let other = each([0; 3], [2, 2, 2]).map(|position| Node {
+        let other = between([0; 3], [2, 2, 2]).map(|position| Node {
             position,
             gamma: 0.5,
             phi: 0.25,

@@ -7,6 +7,7 @@ use super::solve::{NONE, Row};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::Coord;
+use crate::surface::pieces::in_pieces;
 
 /// Role of a node in the matching.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,15 +64,13 @@ impl Free {
             }
             row
         };
-        let in_piece = |piece: &[u32]| {
-            ctx.check()?;
+        let rows = in_pieces(ctx, &free, PIECE, |_, piece| {
             let beside = beside(&sorted, piece);
-            Ok(piece.iter().zip(beside).map(|(at, beside)| row(*at, beside)).collect::<Vec<Row>>())
-        };
-        let rows: Vec<Vec<Row>> = free.par_chunks(PIECE).map(in_piece).collect::<Result<_>>()?;
+            piece.iter().zip(beside).map(|(at, beside)| row(*at, beside)).collect()
+        })?;
         let fixed = roles.iter().filter(|role| **role == Role::Fixed).count();
         let nodes = free.iter().map(|at| sorted[*at as usize].1).collect();
-        Ok(Self { nodes, rows: rows.concat(), fixed })
+        Ok(Self { nodes, rows, fixed })
     }
 }
 
@@ -118,12 +117,7 @@ fn roles(ctx: &Context, nodes: &[Node], sorted: &[(Coord, u32)], reach: i32) -> 
             Role::Kept
         }
     };
-    let in_piece = |piece: &[(Coord, u32)]| {
-        ctx.check()?;
-        Ok(piece.iter().map(role).collect::<Vec<Role>>())
-    };
-    let roles: Vec<Vec<Role>> = sorted.par_chunks(PIECE).map(in_piece).collect::<Result<_>>()?;
-    Ok(roles.concat())
+    in_pieces(ctx, sorted, PIECE, |_, piece| piece.iter().map(role).collect())
 }
 
 /// The neighbours of some nodes, before and behind them on x, y and z; [`NONE`]: there is none. All are indices in the order of positions;

@@ -285,7 +285,7 @@ fn greatest(field: &Field) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
+    use crate::surface::test_particles::context;
 
     /// Free nodes in a line on x, with given values beside some.
     fn line(loads: &[Option<f64>]) -> Vec<Row> {
@@ -311,7 +311,7 @@ mod tests {
         rows[3].beside[0] = NONE;
         let system = System::new(&rows);
         assert_eq!(system.widest, 3);
-        let ctx = Context::new(Pool::new(1).unwrap());
+        let ctx = context(1);
         let solutions = [
             system.over_relaxed(&ctx, system.omega(), 1e-12, 1000).unwrap(),
             system.by_gradients(&ctx, 1e-12, 1000).unwrap(),
@@ -328,7 +328,7 @@ mod tests {
         let mut loads = vec![None; 64];
         loads[0] = Some(1.0);
         let system = System::new(&line(&loads));
-        let ctx = Context::new(Pool::new(1).unwrap());
+        let ctx = context(1);
         for solution in [
             system.over_relaxed(&ctx, system.omega(), 1e-12, 3).unwrap(),
             system.by_gradients(&ctx, 1e-12, 3).unwrap(),

@@ -1,4 +1,0 @@
-//! Files: other readers see what we see, and damaged ones do no harm.
-
-pub mod damage;
-pub mod readers;

@@ -1,4 +1,0 @@
-//! Plots of what was measured against theory.
-
-pub mod chart;
-pub mod font;
