@@ -174,21 +174,20 @@ unsafe impl Sized32 for frz_shallow_params {
         let longest_step = if let TimeStepping::Realtime(longest) = defaults.pace { longest } else { 0.0 };
         // Enums have their first value.
         let mut params = Self {
-            gravity: defaults.gravity,
-            kept: defaults.kept,
             longest_step,
             falls_height: falls.height,
             falls_interval: falls.interval,
             falls_drop: falls.drop,
-            rest: defaults.rest,
             thickening_scalar: FRZ_SHALLOW_NO_SCALAR,
             thickening_times: 1.0,
-            ..Self::zeroed()
+            ..Params::default().into()
         };
         params.set_liquid(&defaults.liquid);
         params
     }
 }
+
+fields_of!(Params <=> frz_shallow_params { gravity, kept, rest });
 
 impl frz_shallow_params {
     fn set_liquid(&mut self, liquid: &Liquid) {
@@ -229,15 +228,13 @@ impl frz_shallow_params {
                 viscosity: self.viscosity,
                 thinning: (self.thinning_time != 0.0).then_some(law),
             },
-            gravity: self.gravity,
-            kept: self.kept,
             pace,
             border: meaning("border", "frz_shallow_border", self.border, &BORDERS)?,
             section: meaning("section", "frz_shallow_section", self.section, &SECTIONS)?,
             friction: meaning("friction", "frz_shallow_friction", self.friction, &FRICTIONS)?,
             thickening: (self.thickening_scalar != FRZ_SHALLOW_NO_SCALAR).then_some(thickening),
             falls: (self.falls_most > 0).then_some(falls),
-            rest: self.rest,
+            ..self.over(Params::default())
         };
         params.validate()?;
         Ok(params)

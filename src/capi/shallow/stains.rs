@@ -43,10 +43,11 @@ unsafe impl Sized32 for frz_shallow_staining {
     const NAME: &'static str = "frz_shallow_staining";
 
     fn defaults() -> Self {
-        let Staining { film, takes, half_life, .. } = Staining::default();
-        Self { scalar: FRZ_SHALLOW_NO_SCALAR, film, takes, half_life, ..Self::zeroed() }
+        Self { scalar: FRZ_SHALLOW_NO_SCALAR, ..Staining::default().into() }
     }
 }
+
+fields_of!(Staining <=> frz_shallow_staining { film, takes, half_life });
 
 impl frz_shallow_staining {
     fn staining(&self) -> Outcome<Staining> {
@@ -55,10 +56,8 @@ impl frz_shallow_staining {
         let absorbing = Absorbing { capacity: self.capacity, rate: self.rate };
         let staining = Staining {
             scalar: (self.scalar != FRZ_SHALLOW_NO_SCALAR).then_some(self.scalar as usize),
-            film: self.film,
-            takes: self.takes,
-            half_life: self.half_life,
             absorbs: (self.capacity != 0.0).then_some(absorbing),
+            ..self.over(Staining::default())
         };
         staining.validate()?;
         Ok(staining)

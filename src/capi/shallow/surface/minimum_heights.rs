@@ -29,10 +29,11 @@ unsafe impl Sized32 for frz_shallow_distance {
     const NAME: &'static str = "frz_shallow_distance";
 
     fn defaults() -> Self {
-        let Distance { least, margin, rim } = Distance::default();
-        Self { least, margin, rim, ..Self::zeroed() }
+        Distance::default().into()
     }
 }
+
+fields_of!(Distance <=> frz_shallow_distance { least, margin, rim });
 
 /// Statistics of the vertices of the mesh that face up, of those that a call visited.
 #[repr(C)]
@@ -78,8 +79,8 @@ pub unsafe extern "C" fn frz_shallow_find_lifts(
     // SAFETY: the pointers are NULL or valid.
     guard(|| unsafe {
         reports(fitted, || {
-            let frz_shallow_distance { flags, least, margin, rim, .. } = given_or_defaults(distance)?;
-            no_flags(flags, 0)?;
+            let distance = given_or_defaults(distance)?;
+            no_flags(distance.flags, 0)?;
             let _call = enter_light(context)?;
             let ShallowHandle { shallow, around, lifted: Lifted { lifts, is_current }, .. } =
                 &mut *change(shallow)?;
@@ -89,7 +90,7 @@ pub unsafe extern "C" fn frz_shallow_find_lifts(
                     "the liquid was not made with a mesh: it needs no minimum heights",
                 ));
             };
-            let (columns, distance) = (shallow.columns(), Distance { least, margin, rim });
+            let (columns, distance) = (shallow.columns(), distance.over(Distance::default()));
             let (positions, triangles) = (&mesh.positions, &mesh.triangles);
             let found = if lifts.least().is_empty() {
                 lifts.reserve(columns.strips().len(), positions.len());

@@ -57,10 +57,11 @@ unsafe impl Sized32 for frz_shallow_layout {
     const NAME: &'static str = "frz_shallow_layout";
 
     fn defaults() -> Self {
-        let Layout { scale, least_depth, opaque_depth, fade_depth, .. } = Layout::default();
-        Self { scale, least_depth, opaque_depth, fade_depth, ..Self::zeroed() }
+        Layout::default().into()
     }
 }
+
+fields_of!(Layout <=> frz_shallow_layout { scale, least_depth, opaque_depth, fade_depth });
 
 impl frz_shallow_layout {
     /// The library's own layout, of which some flags may be set.
@@ -70,12 +71,9 @@ impl frz_shallow_layout {
             FRZ_SHALLOW_Z_UP | FRZ_SHALLOW_LEFT_HANDED | FRZ_SHALLOW_LIFTED | FRZ_SHALLOW_SKIRTED,
         )?;
         Ok(Layout {
-            scale: self.scale,
             up: if self.flags & FRZ_SHALLOW_Z_UP != 0 { Up::Z } else { Up::Y },
             left_handed: self.flags & FRZ_SHALLOW_LEFT_HANDED != 0,
-            least_depth: self.least_depth,
-            opaque_depth: self.opaque_depth,
-            fade_depth: self.fade_depth,
+            ..self.over(Layout::default())
         })
     }
 }
