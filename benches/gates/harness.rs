@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+mod calibration;
 mod list;
 
 pub use list::GATES;
@@ -24,6 +25,19 @@ pub struct Gate {
     pub must: Bound,
     /// What it aims at.
     pub aim: Bound,
+    /// What the machine's speed changes in it.
+    pub speed: Speed,
+}
+
+/// What a faster machine makes of a number.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Speed {
+    /// Nothing, or it is a ratio already, or it matters as seconds of a clock, as a cancel does.
+    Any,
+    /// It is shorter: printed as the time on the machine of the bounds.
+    Time,
+    /// It is higher: printed as the rate on the machine of the bounds.
+    Rate,
 }
 
 /// A bound such as `<=0.1` or `>=1`.
@@ -145,9 +159,14 @@ impl Harness {
         let index = index.unwrap_or_else(|| panic!("list.rs has no gate {name}"));
         assert!(!self.done[index], "gate {name} was printed before");
         self.done[index] = true;
-        let Gate { unit, must, aim, .. } = self.gates[index];
+        let Gate { unit, must, aim, speed, .. } = self.gates[index];
+        let factor = match speed {
+            Speed::Any => 1.0,
+            Speed::Time => 1.0 / calibration::slowness(),
+            Speed::Rate => calibration::slowness(),
+        };
         // A nought is not printed as -0.
-        let value = value.into() + 0.0;
+        let value = value.into() * factor + 0.0;
         let state = match (must.holds(value), aim.holds(value)) {
             (true, true) => "aim",
             (true, false) => "ok",

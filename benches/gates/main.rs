@@ -6,6 +6,7 @@ mod capi;
 mod common;
 #[path = "harness.rs"]
 mod harness;
+mod house;
 mod plots;
 mod process;
 mod reliability;
@@ -58,6 +59,8 @@ fn main() {
     h.measure_all(names, sweep::band::measure);
     sweep::spin::run(&mut h);
     reliability::damage::run(&mut h);
+    h.measure("reliability.gltf_valid", reliability::gltf_valid::measure);
+    h.measure("reliability.guard_page", reliability::guard_page::measure);
     h.measure("reliability.empty_frames", reliability::empty_frames::measure);
     surface::known_motion::run(&mut h);
     h.measure("surface.flag_delay", surface::first_flag::measure);
@@ -113,5 +116,6 @@ fn main() {
     h.measure_all(names, reliability::orientation::measure);
     surface::rest_kept::run(&mut h);
     surface::detail_kept::run(&mut h);
+    h.measure("house.circles", house::circles);
     h.finish();
 }

@@ -3,6 +3,8 @@
 pub mod bugs;
 pub mod damage;
 pub mod empty_frames;
+pub mod gltf_valid;
+pub mod guard_page;
 pub mod orientation;
 pub mod soup;
 pub mod step_calls;

@@ -8,10 +8,10 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-use harness::{Bound, GATES, Gate, Harness};
+use harness::{Bound, GATES, Gate, Harness, Speed};
 
 const fn gate(name: &'static str) -> Gate {
-    Gate { name, unit: "x", must: Bound::Most(2.0), aim: Bound::Least(1.0) }
+    Gate { name, unit: "x", must: Bound::Most(2.0), aim: Bound::Least(1.0), speed: Speed::Any }
 }
 
 const FOUR: &[Gate] =
