@@ -89,15 +89,14 @@ fn character(path: &Path, origin: &Origin) -> frazil::Result<Vec<Value>> {
         "clips_s": clips,
         "nodes": contents.mesh_nodes,
     });
-    let mut set = |key: &str, value: Value| entry.as_object_mut().expect("a map").insert(key.into(), value);
     if !gaits.is_empty() {
-        set("gaits", Value::Object(gaits));
+        entry["gaits"] = Value::Object(gaits);
     }
     if contents.mesh_nodes.len() > FEW_NODES {
         let line = |(name, depth, has_mesh): &(String, usize, bool)| {
             format!("{}{name}{}", "  ".repeat(*depth), if *has_mesh { " (mesh)" } else { "" })
         };
-        set("node_tree", json!(contents.tree.iter().map(line).collect::<Vec<_>>()));
+        entry["node_tree"] = json!(contents.tree.iter().map(line).collect::<Vec<_>>());
     }
     Ok(vec![entry])
 }

@@ -67,11 +67,10 @@ impl Keys {
     /// Position and angles at a time.
     fn numbers(&self, time: f64) -> (DVec3, DVec3) {
         let next = self.keys.partition_point(|key| key.time <= time);
-        match (next.checked_sub(1).map(|index| self.keys[index]), self.keys.get(next)) {
+        match (next.checked_sub(1).map(|index| self.keys[index]), self.keys.get(next).copied()) {
             (Some(_), Some(_)) if self.ease => self.eased(next, time),
             (None, None) => (DVec3::zeros(), DVec3::zeros()),
-            (Some(key), None) => (key.at, key.turn),
-            (None, Some(key)) => (key.at, key.turn),
+            (Some(key), None) | (None, Some(key)) => (key.at, key.turn),
             (Some(a), Some(b)) => {
                 let part = (time - a.time) / (b.time - a.time);
                 (a.at.lerp(&b.at, part), a.turn.lerp(&b.turn, part))

@@ -2,6 +2,8 @@
 
 mod drawing;
 mod flipbook;
+#[cfg(feature = "vdb")]
+mod grids;
 mod in_order;
 mod parts;
 #[cfg(feature = "vdb")]

@@ -7,9 +7,6 @@ use frazil::geometry::{DetailedMesh, Points, TriMesh};
 use frazil::vdb::FloatGrid;
 use frazil::{Context, Error, Result, io};
 
-#[cfg(feature = "vdb")]
-use crate::cli::vdb::model::{self, Content};
-
 /// A part of a picture, as read.
 pub enum Part {
     /// A mesh with its arrays.
@@ -98,19 +95,6 @@ impl Wet {
         let known = [Self::WATER, Self::PAINT, Self::HONEY].into_iter().find(|known| known.name == name);
         known.unwrap_or(Self::BLOOD)
     }
-}
-
-/// Reads a .vdb file.
-///
-/// # Errors
-/// A file that cannot be read, or that holds nothing to draw.
-#[cfg(feature = "vdb")]
-pub fn of_vdb(path: &Path) -> Result<Vec<Part>> {
-    Ok(match model::read(path)? {
-        Content::Surface(grid) => vec![Part::Surface(grid)],
-        Content::Fogs(grids) => grids.into_iter().map(|grid| Part::Fog(path.to_path_buf(), grid)).collect(),
-        Content::Points(points) => vec![Part::Points(path.to_path_buf(), points)],
-    })
 }
 
 /// Reads points of a file other than .vdb.

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::parts::{Folder, Part, of_vdb, points_of};
+use super::grids::of_vdb;
+use super::parts::{Folder, Part, points_of};
 use frazil::io::mesh::{self, extension};
 use frazil::scene::run::Stored;
 use frazil::scene::{Rebuild, RebuildGrains, Scene};

@@ -8,7 +8,7 @@ use frazil::motion::{Character, Play, is_gltf};
 use frazil::{Context, Error, Result, io};
 
 #[cfg(feature = "vdb")]
-use super::parts::of_vdb;
+use super::grids::of_vdb;
 use super::parts::{Folder, Part, points_of};
 #[cfg(feature = "vdb")]
 use super::shot::Shot;

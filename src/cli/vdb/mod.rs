@@ -6,7 +6,6 @@ mod filter;
 mod from_mesh;
 mod from_particles;
 pub mod info;
-pub mod model;
 mod rebuild;
 mod sweep;
 mod to_mesh;

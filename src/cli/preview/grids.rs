@@ -1,20 +1,10 @@
-//! The parts of .vdb files that `frazil preview` draws.
+//! The parts of .vdb files that a picture shows.
 
 use std::path::Path;
 
-use frazil::geometry::Points;
+use super::parts::Part;
 use frazil::scene::{changes_since, partial};
-use frazil::vdb::{FloatGrid, file, points};
-
-/// The drawn part of a file.
-pub enum Content {
-    /// A level set.
-    Surface(FloatGrid),
-    /// Fog volumes, at least one.
-    Fogs(Vec<FloatGrid>),
-    /// Points.
-    Points(Points),
-}
+use frazil::vdb::{file, points};
 
 /// Name of the fog volume that represents a file: others beside it are temperatures, fuels and the like.
 const DENSITY: &str = "density";
@@ -24,18 +14,19 @@ const DENSITY: &str = "density";
 ///
 /// # Errors
 /// A file that cannot be read, or that holds none of these.
-pub fn read(path: &Path) -> frazil::Result<Content> {
+pub fn of_vdb(path: &Path) -> frazil::Result<Vec<Part>> {
     let grids = file::describe(path)?;
     let of_type = |start: &'static str| grids.iter().filter(move |grid| grid.value_type.starts_with(start));
     let floats = || of_type("Tree_float");
+    let fog = |grid| Part::Fog(path.to_path_buf(), grid);
     if floats().next().is_none() && of_type("Tree_ptdataidx32").next().is_some() {
         if let Some(since) = changes_since(path)? {
             log::warn!("{}: {}", path.display(), partial(since));
         }
-        return points::read(path, None).map(Content::Points);
+        return Ok(vec![Part::Points(path.to_path_buf(), points::read(path, None)?)]);
     }
     if floats().any(|grid| grid.class == "level set") {
-        return file::read_named(path, None).map(Content::Surface);
+        return Ok(vec![Part::Surface(file::read_named(path, None)?)]);
     }
     let mut names: Vec<&str> = match floats().find(|grid| grid.name == DENSITY) {
         Some(_) => vec![DENSITY],
@@ -44,8 +35,7 @@ pub fn read(path: &Path) -> frazil::Result<Content> {
     // If several grids have the same name, the first is read.
     names.dedup();
     if names.is_empty() {
-        return file::read_named(path, None).map(|grid| Content::Fogs(vec![grid]));
+        return Ok(vec![fog(file::read_named(path, None)?)]);
     }
-    let fogs = names.into_iter().map(|name| file::read_named(path, Some(name)));
-    fogs.collect::<frazil::Result<_>>().map(Content::Fogs)
+    names.into_iter().map(|name| file::read_named(path, Some(name)).map(fog)).collect()
 }
