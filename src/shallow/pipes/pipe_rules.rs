@@ -1,10 +1,9 @@
 //! Settings that pipes depend on besides the columns.
 
-use std::ops::Range;
-
 use super::Border;
 use super::cliffs::Cliffs;
 use crate::shallow::columns::Columns;
+use crate::shallow::columns::grid::Cells;
 use crate::shallow::free_fall::Falls;
 use crate::shallow::params::{Friction, Params};
 
@@ -22,7 +21,7 @@ pub(in crate::shallow) struct Rules {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::shallow) struct ExcludedCells {
     /// A box of cells: ranges of x and of z.
-    pub cells: [Range<usize>; 2],
+    pub cells: Cells,
     /// Whether the cells are those in the box; otherwise they are all others.
     pub is_inside: bool,
 }

@@ -35,7 +35,7 @@ impl Snapshot {
     pub fn new(shallow: &Shallow) -> Self {
         let (columns, len) = (shallow.columns.clone(), shallow.columns.len());
         let mut snapshot = Self {
-            terrain: shallow.identity.number(),
+            terrain: shallow.identity.number,
             active: vec![false; columns.strips().len()],
             columns,
             depth: vec![0; len],
@@ -51,8 +51,8 @@ impl Snapshot {
     /// Replaces the contents by the current liquid: the strips that have or had liquid, and the columns where the terrain has
     /// changed. Allocates nothing, unless these are more than ever before; it may be another liquid.
     pub fn take(&mut self, shallow: &Shallow) {
-        if self.terrain != shallow.identity.number() {
-            self.terrain = shallow.identity.number();
+        if self.terrain != shallow.identity.number {
+            self.terrain = shallow.identity.number;
             self.columns.clone_from(&shallow.columns);
             reset(&mut self.active, self.columns.strips().len(), false);
             reset(&mut self.depth, self.columns.len(), 0);

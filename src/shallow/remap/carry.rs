@@ -156,7 +156,7 @@ impl Carry {
             let now = if number == 0 { &mut flow.flux } else { &mut flow.left };
             *strip_mut(&mut now[axis], strip) = *before;
         }
-        if change.origins.odd().is_empty() {
+        if change.origins.odd.is_empty() {
             return;
         }
         for x in (0..STRIP).filter(|x| kept >> x & 1 == 0 && open[*x] > 0.0) {
@@ -188,7 +188,7 @@ impl Carry {
                 }
             }
         }
-        for [index, old] in origins.odd() {
+        for [index, old] in &origins.odd {
             over[*index as usize] = band.over[*old as usize];
         }
     }

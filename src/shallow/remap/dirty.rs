@@ -3,16 +3,17 @@
 use std::ops::Range;
 
 use crate::shallow::columns::STRIP;
+use crate::shallow::columns::grid::Cells;
 
 /// Cells whose solids change.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Dirty {
     /// Blocks of 16 cells in a row.
-    blocks: usize,
+    pub blocks: usize,
     /// Bits of the dirty cells of each block, row by row.
     cells: Vec<u16>,
-    /// The range of rows with dirty cells.
-    rows: Range<usize>,
+    /// The rows from the first to the last dirty cell.
+    pub rows: Range<usize>,
 }
 
 impl Dirty {
@@ -25,7 +26,7 @@ impl Dirty {
     }
 
     /// Adds a box of cells: ranges of x and of z.
-    pub fn mark(&mut self, [across, rows]: &[Range<usize>; 2]) {
+    pub fn mark(&mut self, [across, rows]: &Cells) {
         if across.is_empty() || rows.is_empty() {
             return;
         }
@@ -43,16 +44,6 @@ impl Dirty {
         }
     }
 
-    /// The rows from the first to the last dirty cell.
-    pub fn rows(&self) -> Range<usize> {
-        self.rows.clone()
-    }
-
-    /// Blocks in a row.
-    pub fn blocks(&self) -> usize {
-        self.blocks
-    }
-
     /// Bits of the dirty cells in a block of a row.
     #[inline]
     pub fn of(&self, row: usize, block: usize) -> u16 {
@@ -67,7 +58,7 @@ impl Dirty {
 
     /// All dirty cells (x, z), row by row along x.
     pub fn iter(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
-        let blocks = self.rows().flat_map(move |row| (0..self.blocks).map(move |block| [block, row]));
+        let blocks = self.rows.clone().flat_map(move |row| (0..self.blocks).map(move |block| [block, row]));
         blocks.flat_map(move |[block, row]| {
             let cells = self.of(row, block);
             let set = (0..STRIP).filter(move |position| cells >> position & 1 == 1);
@@ -90,7 +81,7 @@ mod tests {
         let mut expected: Vec<[usize; 2]> = (1..3).flat_map(|z| (14..34).map(move |x| [x, z])).collect();
         expected.extend([[15, 3], [16, 3]]);
         assert!(dirty.iter().eq(expected.iter().copied()));
-        assert_eq!((dirty.rows(), dirty.count(), dirty.of(2, 1)), (1..4, 42, u16::MAX));
+        assert_eq!((dirty.rows.clone(), dirty.count(), dirty.of(2, 1)), (1..4, 42, u16::MAX));
         dirty.clear([40, 5]);
         assert_eq!((dirty.count(), dirty.iter().next()), (0, None));
         dirty.mark(&[0..40, 0..5]);

@@ -5,6 +5,7 @@
 use crate::numeric::lists::refill;
 use crate::shallow::columns::Columns;
 use crate::shallow::columns::grid::BOTTOMLESS;
+use crate::shallow::pipes::side::Side;
 use crate::shallow::scalars::MOST;
 use crate::shallow::scalars::amounts::Account;
 use crate::shallow::scalars::shares::{part, take};
@@ -170,18 +171,13 @@ impl Held {
 
     /// Offers each parcel to the adjacent cells that have room.
     fn offer(&mut self, columns: &Columns, flow: &Flow) {
-        let [nx, nz] = columns.grid.size;
+        let grid = &columns.grid;
         self.offers.clear();
         for (number, parcel) in self.parcels.iter().enumerate() {
-            let (x, z) = (parcel.cell as usize % nx, parcel.cell as usize / nx);
-            let beside = [
-                (x + 1 < nx).then_some(parcel.cell.wrapping_add(1)),
-                (x > 0).then_some(parcel.cell.wrapping_sub(1)),
-                (z + 1 < nz).then_some(parcel.cell.wrapping_add(nx as u32)),
-                (z > 0).then_some(parcel.cell.wrapping_sub(nx as u32)),
-            ];
+            let own = grid.position(parcel.cell as usize);
             let first = self.offers.len();
-            for cell in beside.into_iter().flatten() {
+            for cell in Side::ALL.into_iter().filter_map(|side| side.cell(own, grid.size)) {
+                let cell = grid.index(cell) as u32;
                 if room(columns, flow, cell, parcel.height) > 0 {
                     let (height, amounts) = (parcel.height, [0; MOST]);
                     self.offers.push(Offer { cell, height, units: 0, amounts, parcel: number as u32 });
@@ -226,16 +222,15 @@ impl Held {
 
 /// Whether a cell is void at a height: it has no ground, or only ground that hangs above.
 fn is_void(columns: &Columns, cell: u32, height: i32) -> bool {
-    let lowest = columns.of_cell(position(columns, cell)).next();
+    let lowest = columns_of(columns, cell).next();
     lowest.is_none_or(|lowest| {
         let under = columns.unders()[lowest];
         under != BOTTOMLESS && height < under
     })
 }
 
-fn position(columns: &Columns, cell: u32) -> [usize; 2] {
-    let nx = columns.grid.size[0];
-    [cell as usize % nx, cell as usize / nx]
+fn columns_of(columns: &Columns, cell: u32) -> impl Iterator<Item = usize> {
+    columns.of_cell(columns.grid.position(cell as usize))
 }
 
 fn room_of(columns: &Columns, flow: &Flow, column: usize) -> i64 {
@@ -248,7 +243,7 @@ fn room(columns: &Columns, flow: &Flow, cell: u32, height: i32) -> i64 {
     if is_void(columns, cell, height) {
         return 0;
     }
-    columns.of_cell(position(columns, cell)).map(|column| room_of(columns, flow, column)).sum()
+    columns_of(columns, cell).map(|column| room_of(columns, flow, column)).sum()
 }
 
 /// Fills the columns of a cell, from the one at the parcel's height up, then from there down; the parcel keeps the rest.
@@ -256,7 +251,7 @@ fn put(columns: &Columns, flow: &mut Flow, order: &mut Vec<u32>, parcel: &mut Pa
     if is_void(columns, parcel.cell, parcel.height) {
         return;
     }
-    refill(order, columns.of_cell(position(columns, parcel.cell)).map(|column| column as u32));
+    refill(order, columns_of(columns, parcel.cell).map(|column| column as u32));
     let first = order.partition_point(|&column| columns.ceilings()[column as usize] <= parcel.height);
     let (below, above) = order.split_at(first);
     for &column in above.iter().chain(below.iter().rev()) {

@@ -51,9 +51,9 @@ impl Layout {
         self.counts.clear();
         let mut next = 0;
         for row in band.rows.clone() {
-            self.old.find(&band.strips, band.row(row), dirty.blocks());
+            self.old.find(&band.strips, band.row(row), dirty.blocks);
             let first = self.layers.len();
-            for block in 0..dirty.blocks() {
+            for block in 0..dirty.blocks {
                 let (cells, old) = (dirty.of(row, block), self.old.of(block));
                 let stays = |strip: u32| band.present[strip as usize] & !cells != 0;
                 let mut layers = old.iter().rposition(|&strip| stays(strip)).map_or(0, |last| last + 1);
@@ -78,7 +78,7 @@ impl Layout {
         held: &mut Held,
     ) -> i64 {
         let Rows { dirty, band, cast } = rows;
-        let blocks = dirty.blocks();
+        let blocks = dirty.blocks;
         self.cell.reach = (REACH * columns.grid.cell / columns.heights.unit).min(f64::from(TOP)) as i64;
         let grid = columns.grid;
         origins.begin(band, self.counts.iter().sum::<u32>() as usize);

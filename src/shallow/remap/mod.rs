@@ -19,7 +19,7 @@ use std::ops::Range;
 
 use super::Shallow;
 use super::columns::STRIP;
-use super::columns::grid::check_cells;
+use super::columns::grid::{Cells, check_cells};
 use super::pipes::pipe_rules::Rules;
 use super::terrain::Solids;
 use super::terrain::identity::Identity;
@@ -68,11 +68,7 @@ impl Shallow {
     ///
     /// # Errors
     /// `Argument`: the box is not within the domain.
-    pub fn update_cells<'a>(
-        &mut self,
-        cells: [Range<usize>; 2],
-        solids: impl Fn(usize) -> &'a [Solid],
-    ) -> Result<Moved> {
+    pub fn update_cells<'a>(&mut self, cells: Cells, solids: impl Fn(usize) -> &'a [Solid]) -> Result<Moved> {
         let grid = self.columns.grid;
         check_cells(&cells, grid.size)?;
         self.remap.dirty.clear(grid.size);
@@ -126,7 +122,7 @@ impl Shallow {
 
     /// Rebuilds the dirty cells, from solids by their rank among them.
     fn rebuild<'a>(&mut self, cast: impl Fn(usize) -> &'a [Solid]) -> Moved {
-        let rows = self.remap.dirty.rows();
+        let rows = self.remap.dirty.rows.clone();
         let volume = self.columns.grid.cell * self.columns.grid.cell * self.columns.heights.unit;
         if rows.is_empty() {
             return Moved { held: self.remap.held.units() as f64 * volume, ..Moved::default() };

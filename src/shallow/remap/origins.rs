@@ -14,7 +14,7 @@ pub(super) struct Origins {
     /// there.
     strips: Vec<(u32, u16)>,
     /// Columns that were in other layers: their indices, and the former ones, within the band.
-    odd: Vec<[u32; 2]>,
+    pub odd: Vec<[u32; 2]>,
 }
 
 impl Default for Origins {
@@ -54,11 +54,6 @@ impl Origins {
     /// Finishes a band.
     pub fn finish(&mut self) {
         self.odd.sort_unstable();
-    }
-
-    /// Columns that were in other layers: their indices, and the former ones, within the band.
-    pub fn odd(&self) -> &[[u32; 2]] {
-        &self.odd
     }
 
     /// How much the numbers of strips behind the band grow, modulo 2^32.

@@ -116,7 +116,7 @@ impl Detail {
         let counts = [self.seam.numbers().len(), self.rest.iter().count()];
         to.numbers(&counts.map(|count| count as u32), u32::to_le_bytes);
         to.numbers(&sizes.map(|size| size as u64), u64::to_le_bytes);
-        to.numbers(&[self.seam.last()], f64::to_le_bytes);
+        to.numbers(&[self.seam.last], f64::to_le_bytes);
         for (cell, load) in self.rest.iter() {
             to.numbers(&[cell as u32, 0], u32::to_le_bytes);
             to.bytes(&load.units.to_le_bytes());

@@ -41,15 +41,12 @@ impl Scalar {
 
     /// A concentration in levels.
     pub fn level(&self, concentration: f64) -> Result<i32> {
-        if concentration.abs() <= self.range {
-            Ok((concentration / self.range * LEVELS).round() as i32)
-        } else {
-            let Self { name, range, .. } = self;
-            Err(Error::argument(format!(
-                "a concentration of {concentration} of {name:?} is not within {} to {range}",
-                -range
-            )))
-        }
+        let (Self { name, range, .. }, least) = (self, -self.range);
+        ensure(
+            concentration.abs() <= *range,
+            format_args!("a concentration of {concentration} of {name:?} is not within {least} to {range}"),
+        )?;
+        Ok((concentration / range * LEVELS).round() as i32)
     }
 }
 

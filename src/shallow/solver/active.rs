@@ -27,19 +27,19 @@ pub struct Span {
 /// The active strips.
 #[derive(Debug, Clone, Default)]
 pub struct Active {
-    /// Whether each strip had liquid after the last step.
-    wet: Vec<bool>,
+    /// Whether each strip had liquid at the start of the frame, or has become wet since.
+    pub(super) wet: Vec<bool>,
     /// Whether each strip is wet or beside a wet one: all others have neither liquid nor flow.
-    active: Vec<bool>,
+    pub(super) active: Vec<bool>,
     /// Whether the content of each strip may move: an active strip that rests, and whose neighbours rest, too, sleeps.
-    moving: Vec<bool>,
+    pub(super) moving: Vec<bool>,
     asleep: Vec<bool>,
     /// Whether any strip may be asleep.
-    any_asleep: bool,
+    pub(super) any_asleep: bool,
     /// Whether nothing in a row, including its links, may move: steps skip it.
     resting: Vec<bool>,
     /// Maximum depth of the sleeping strips of each row (units).
-    asleep_depths: Vec<i32>,
+    pub(super) asleep_depths: Vec<i32>,
     /// Whether some column of each strip has room for liquid: walls are never active.
     has_room: Vec<bool>,
     /// The strips that links lead to, for each strip, and where each list begins.
@@ -181,21 +181,6 @@ impl Active {
         &self.spans[first..first + self.counts[row] as usize]
     }
 
-    /// Whether each strip had liquid at the start of the frame, or has become wet since.
-    pub fn wet(&self) -> &[bool] {
-        &self.wet
-    }
-
-    /// Whether each strip is wet or beside a wet one: all others have neither liquid nor flow.
-    pub(super) fn active(&self) -> &[bool] {
-        &self.active
-    }
-
-    /// Whether the content of each strip may move.
-    pub fn moving(&self) -> &[bool] {
-        &self.moving
-    }
-
     /// Whether nothing in a row, including its links, may move.
     pub fn rests(&self, row: usize) -> bool {
         self.resting[row]
@@ -204,16 +189,6 @@ impl Active {
     /// Whether nothing may move in any row.
     pub fn all_rest(&self) -> bool {
         !self.resting.contains(&false)
-    }
-
-    /// Whether any strip may be asleep.
-    pub fn may_sleep(&self) -> bool {
-        self.any_asleep
-    }
-
-    /// Maximum depths of the sleeping strips of all rows (units).
-    pub fn asleep_depths(&self) -> &[i32] {
-        &self.asleep_depths
     }
 
     /// Maximum depth of the sleeping strips of a row (units).

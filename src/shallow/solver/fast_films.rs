@@ -28,9 +28,9 @@ pub const NORMAL: u32 = 0x3f80_3f80;
 #[derive(Debug, Clone)]
 pub struct Fast {
     /// Inertia factors of the pipes of each column, to the east and to the south ([`packed`]); of rows that have fast pipes.
-    light: PerColumn<u32>,
-    /// Strips of those rows with fast pipes.
-    strips: Vec<bool>,
+    pub(super) light: PerColumn<u32>,
+    /// Whether each strip has fast pipes; of those rows.
+    pub(super) strips: Vec<bool>,
     rows: Vec<bool>,
 }
 
@@ -77,16 +77,6 @@ impl Fast {
     /// Whether a row has fast pipes.
     pub fn row(&self, row: usize) -> bool {
         self.rows[row]
-    }
-
-    /// Inertia factors of the pipes of all columns (`packed`).
-    pub fn light(&self) -> &[u32] {
-        &self.light
-    }
-
-    /// Whether each strip has fast pipes; of rows with fast pipes.
-    pub fn strips(&self) -> &[bool] {
-        &self.strips
     }
 
     /// Marks nothing as fast: there is no viscosity.

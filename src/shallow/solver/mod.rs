@@ -151,7 +151,7 @@ impl Flow {
 
     /// Whether each strip is wet or beside a wet one: all others have neither liquid nor flow.
     pub(super) fn active(&self) -> &[bool] {
-        self.active.active()
+        &self.active.active
     }
 
     /// Fluxes (units in a step of `last`) and remainders of transfers (units), each to the east and to the south, by column index.
@@ -164,7 +164,7 @@ impl Flow {
     pub(super) fn stored(&mut self) -> Stored<'_> {
         let ([east, south], [left_east, left_south]) = (&mut self.flux, &mut self.left);
         Stored {
-            active: self.active.active(),
+            active: &self.active.active,
             depth: &mut self.depth,
             numbers: [east, south, left_east, left_south],
             heads: self.network.over_mut(),
@@ -219,7 +219,7 @@ impl Flow {
         self.depth[index] = after as i32;
         self.bands.deepen(columns.cell(index)[1], after as i32);
         let strip = index / STRIP;
-        if after > 0 && !self.active.wet()[strip] || after != before && !self.active.moving()[strip] {
+        if after > 0 && !self.active.wet[strip] || after != before && !self.active.moving[strip] {
             self.active.wake(columns, strip);
         }
         after - before
@@ -250,7 +250,7 @@ impl Flow {
         self.active.refit(columns, links, rows.clone(), &self.depth);
         let Self { flux, left, network, active, .. } = self;
         for strip in columns.row(rows.start).start..columns.row(rows.end - 1).end {
-            if !active.active()[strip] {
+            if !active.active[strip] {
                 flux.iter_mut().chain(&mut *left).for_each(|flow| strip_mut(flow, strip).fill(0.0));
                 network.dry(strip * STRIP..(strip + 1) * STRIP);
             }
@@ -312,7 +312,7 @@ impl Flow {
     pub fn step(&mut self, columns: &Columns, pipes: &Pipes, step: &Step, dt: f64, stop: &Stop) -> [u32; 3] {
         self.active.refresh(columns, &self.depth);
         if self.active.all_rest() && self.network.is_empty() {
-            self.bands.row_depths_mut().copy_from_slice(self.active.asleep_depths());
+            self.bands.row_depths_mut().copy_from_slice(&self.active.asleep_depths);
             self.last = dt;
             return [0; 3];
         }
@@ -360,7 +360,7 @@ impl Flow {
             self.amounts.settle(&stepped.carried);
             (stepped.scaled, stepped.outside, stepped.carried) = Default::default();
         }
-        if self.active.may_sleep() {
+        if self.active.any_asleep {
             self.stir(columns, &pipes.links);
         }
         self.last = dt;

@@ -132,11 +132,6 @@ impl Stains {
         })
     }
 
-    /// The parameters of staining.
-    pub fn staining(&self) -> &Staining {
-        &self.staining
-    }
-
     /// Count of vertices.
     pub fn len(&self) -> usize {
         self.stain.len()

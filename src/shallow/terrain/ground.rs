@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::shapes::Shape;
 use super::solids::{Solid, unite};
-use crate::shallow::columns::grid::{Grid, Heights};
+use crate::shallow::columns::grid::{Cells, Grid, Heights};
 
 /// Solids of cells, one after another.
 #[derive(Debug, Clone, Default)]
@@ -62,7 +62,7 @@ impl Ground {
     }
 
     /// Sets the shapes; calls `see` with the boxes of cells that a changed shape may have covered before, or may cover now.
-    pub fn set_bodies(&mut self, grid: &Grid, bodies: &[Shape], mut see: impl FnMut([Range<usize>; 2])) {
+    pub fn set_bodies(&mut self, grid: &Grid, bodies: &[Shape], mut see: impl FnMut(Cells)) {
         for index in 0..bodies.len().max(self.bodies.len()) {
             let (old, new) = (self.bodies.get(index), bodies.get(index));
             if old != new {
@@ -84,12 +84,7 @@ impl Ground {
     }
 
     /// Replaces the solids of a box of cells by those of `cast`, one cell after another, row by row along x.
-    pub fn replace<'a>(
-        &mut self,
-        grid: &Grid,
-        [across, rows]: &[Range<usize>; 2],
-        cast: impl Fn(usize) -> &'a [Solid],
-    ) {
+    pub fn replace<'a>(&mut self, grid: &Grid, [across, rows]: &Cells, cast: impl Fn(usize) -> &'a [Solid]) {
         let nx = grid.size[0];
         let Self { own, spare, .. } = self;
         spare.clear();

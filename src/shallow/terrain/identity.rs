@@ -11,7 +11,8 @@ use crate::shallow::columns::{Columns, STRIP};
 /// columns get a new identity.
 #[derive(Debug)]
 pub(in crate::shallow) struct Identity {
-    number: u64,
+    /// A number that no other columns have had in this process; over 0.
+    pub number: u64,
     /// Computed on first use.
     hash: OnceLock<[u8; 16]>,
 }
@@ -21,11 +22,6 @@ impl Identity {
     pub fn new() -> Self {
         static NEXT: AtomicU64 = AtomicU64::new(1);
         Self { number: NEXT.fetch_add(1, Ordering::Relaxed), hash: OnceLock::new() }
-    }
-
-    /// A number that no other columns have had in this process; over 0.
-    pub fn number(&self) -> u64 {
-        self.number
     }
 
     /// Hash of the columns that have this identity: the same on every machine.
@@ -72,7 +68,7 @@ mod tests {
     fn terrains_differ_by_their_hash_and_every_identity_by_its_number() {
         let own = columns(1.0, 2.0, 10);
         let (first, second) = (Identity::new(), Identity::new());
-        assert_ne!(first.number(), second.number());
+        assert_ne!(first.number, second.number);
         assert_eq!(first.hash(&own), second.hash(&own));
         for other in [columns(1.5, 2.0, 10), columns(1.0, 3.0, 10), columns(1.0, 2.0, 11)] {
             assert_ne!(first.hash(&own), Identity::new().hash(&other));

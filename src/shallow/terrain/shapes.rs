@@ -1,11 +1,9 @@
 //! Solids of simple moving shapes: obstacles for which no triangle is cast.
 
-use std::ops::Range;
-
 use super::solids::Solid;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
-use crate::shallow::columns::grid::{Grid, Heights};
+use crate::shallow::columns::grid::{Cells, Grid, Heights};
 
 /// Tolerance for the axes of a cuboid, which must be perpendicular unit vectors.
 const SKEW: f64 = 1e-6;
@@ -77,7 +75,7 @@ impl Shape {
     }
 
     /// The cells that it may cover: ranges of x and of z. Other cells contain no solid of it.
-    pub fn cells(&self, grid: &Grid) -> [Range<usize>; 2] {
+    pub fn cells(&self, grid: &Grid) -> Cells {
         let bounds = self.bounds();
         [0, 1].map(|axis| {
             let count = grid.size[axis] as f64;

@@ -21,7 +21,7 @@ impl Solids {
     /// Intervals from a list for each cell, row by row along x (`Grid::index`). They are sorted and united here: those that touch or
     /// overlap become one, and empty ones (top below bottom) are dropped.
     pub fn new(grid: Grid, heights: Heights, cells: impl IntoIterator<Item = Vec<Solid>>) -> Self {
-        let mut out = Self { grid, heights, starts: vec![0], solids: Vec::new() };
+        let mut out = Self::empty(grid, heights);
         for mut cell in cells {
             unite(&mut cell);
             out.push(&cell);

@@ -11,8 +11,6 @@
 //! A line that meets an edge or vertex exactly passes it on the side of larger x, or z. A scene that is mirrored or rotated by 90 degrees
 //! gives the same solids unless a line meets the silhouette of a solid exactly; the line then belongs to the other side.
 
-use std::ops::Range;
-
 use super::Solids;
 use super::crossings::{Crossed, Facet};
 use super::lines::{LANES, Lines, Outline, Spans};
@@ -23,7 +21,7 @@ use crate::geometry::Vec3;
 use crate::numeric::checks::ensure;
 use crate::numeric::cpu::{FlushDenormals, dispatch};
 use crate::numeric::lists::refill;
-use crate::shallow::columns::grid::{Grid, Heights, check_cells};
+use crate::shallow::columns::grid::{Cells, Grid, Heights, check_cells};
 
 /// Up to this many lines are tested against a triangle without looking at its edges.
 const FEW: u32 = 3;
@@ -49,7 +47,7 @@ pub struct Caster {
     /// Along x and along z.
     lines: [Lines; 2],
     /// The cells of the last cast, along x and z.
-    cells: [Range<usize>; 2],
+    cells: Cells,
     /// For each vertex, the counts of lines left of it.
     ranks: Vec<[u32; 2]>,
     piles: Piles,
@@ -107,12 +105,7 @@ impl Caster {
     /// # Errors
     /// `Argument`: no triangle, a vertex that is not finite, an index beyond the vertices, a box that is not within the grid. The
     /// caster then has no cells.
-    pub fn cast(
-        &mut self,
-        positions: &[Vec3],
-        triangles: &[[u32; 3]],
-        cells: [Range<usize>; 2],
-    ) -> Result<()> {
+    pub fn cast(&mut self, positions: &[Vec3], triangles: &[[u32; 3]], cells: Cells) -> Result<()> {
         let _flushed = FlushDenormals::begin();
         self.begin(&cells)?;
         ensure(!triangles.is_empty(), "the terrain has no triangles")?;
@@ -125,7 +118,7 @@ impl Caster {
         Ok(())
     }
 
-    fn begin(&mut self, cells: &[Range<usize>; 2]) -> Result<()> {
+    fn begin(&mut self, cells: &Cells) -> Result<()> {
         self.cells = [0..0, 0..0];
         self.starts.clear();
         self.solids.clear();
@@ -135,7 +128,7 @@ impl Caster {
     }
 
     /// Ranks of all vertices, clamped to the box.
-    fn rank(&mut self, positions: &[Vec3], [x, z]: &[Range<usize>; 2]) -> Result<()> {
+    fn rank(&mut self, positions: &[Vec3], [x, z]: &Cells) -> Result<()> {
         let [along_x, along_z] = &self.lines;
         let [x, z] = [x, z].map(|range| [range.start as u32, range.end as u32]);
         let mut is_finite = true;
@@ -155,7 +148,7 @@ impl Caster {
     }
 
     /// Lists the crossings of each cell.
-    fn cross(&mut self, positions: &[Vec3], triangles: &[[u32; 3]], cells: &[Range<usize>; 2]) -> Result<()> {
+    fn cross(&mut self, positions: &[Vec3], triangles: &[[u32; 3]], cells: &Cells) -> Result<()> {
         let ([x, z], lines, heights) = (cells, &self.lines, self.heights);
         let (ranks, piles) = (&self.ranks[..], &mut self.piles);
         let first = [x.start as u32, z.start as u32];
@@ -165,7 +158,7 @@ impl Caster {
     }
 
     /// The box of the last cast: ranges of x and of z.
-    pub fn cells(&self) -> [Range<usize>; 2] {
+    pub fn cells(&self) -> Cells {
         self.cells.clone()
     }
 

@@ -64,7 +64,7 @@ pub(in crate::shallow) struct Seam {
     /// Whether a pipe has a transfer in this step.
     is_moving: bool,
     /// Length of the step that fluxes refer to (s).
-    last: f64,
+    pub last: f64,
 }
 
 impl Seam {
@@ -170,11 +170,6 @@ impl Seam {
     /// Flux and rounding remainder of each pipe, in order: the part of a saved state that describes the edge.
     pub fn numbers(&self) -> impl ExactSizeIterator<Item = [f32; 2]> + '_ {
         self.pipes.iter().map(|pipe| [pipe.flux, pipe.left])
-    }
-
-    /// Length of the step that fluxes refer to (s).
-    pub fn last(&self) -> f64 {
-        self.last
     }
 
     /// Restores that part of a saved state.

@@ -184,12 +184,10 @@ impl Grains {
     /// Too many grains; a position out of range; a velocity that is not finite or over [`FASTEST`].
     pub fn emit(&mut self, positions: &[DVec3], velocities: &[[f32; 3]], frame: i32) -> Result<u32> {
         if !velocities.is_empty() && velocities.len() != positions.len() {
-            let text = format!(
-                "velocities: {} elements, but there are {} positions",
-                velocities.len(),
-                positions.len()
-            );
-            return Err(Error::argument(text));
+            let (given, count) = (velocities.len(), positions.len());
+            return Err(Error::argument(format!(
+                "velocities: {given} elements, but there are {count} positions"
+            )));
         }
         let is_out = |position: &DVec3| {
             !position.iter().all(|x| x.is_finite())
@@ -200,10 +198,9 @@ impl Grains {
         }
         let is_fast = |velocity: &[f32; 3]| velocity.iter().any(|x| !(-FASTEST..=FASTEST).contains(x));
         if let Some(at) = velocities.iter().position(is_fast) {
-            let text = format!(
+            return Err(Error::argument(format!(
                 "velocities: element {at} has a component that is not within -{FASTEST} to {FASTEST} m/s"
-            );
-            return Err(Error::argument(text));
+            )));
         }
         self.room_for(positions.len(), frame)?;
         let first = self.next_id;

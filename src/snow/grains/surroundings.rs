@@ -145,7 +145,7 @@ impl<'a> Surroundings<'a> {
             colliders.shells.push((shell, Box::new(rests)));
         }
         for ground in self.ground {
-            let shell = ground.shell().clone();
+            let shell = ground.shell.clone();
             let bounds = bounds(shell.vertices());
             boxes.iter_mut().for_each(|boxes| boxes.push(bounds));
             // Its shell ignores poses.

@@ -53,10 +53,9 @@ pub fn grains(ctx: &Context, centres: &[DVec3], radius: f64, voxel: f64) -> Resu
     }
     // A product with a radius may be off in its last bit.
     if !(voxel > 0.0 && voxel <= VOXEL * radius * (1.0 + 1.0e-9)) {
-        let what = format!(
+        return Err(Error::argument(format!(
             "voxels of {voxel} m are not above 0 and at most half of the grains' radius of {radius} m"
-        );
-        return Err(Error::argument(what));
+        )));
     }
     let full = radius / voxel;
     let spheres = Spheres::new(ctx, centres, voxel, full * (1.0 + FALLOFF), EDGE)?;

@@ -283,7 +283,7 @@ impl Pass<'_> {
         let Liquid { columns, pipes, fast, depth, flux, .. } = *self.liquid;
         let (at, bases) = (strip * STRIP, columns.bases());
         let row = columns.strips()[strip].row as usize;
-        let light = if fast.row(row) { strip_of(fast.light(), strip) } else { &[NORMAL; STRIP] };
+        let light = if fast.row(row) { strip_of(&fast.light, strip) } else { &[NORMAL; STRIP] };
         let [all, contact_before, contact_behind] = &self.beside[AXIS];
         let (all, all_numbers) = (all.before(strip, 0), all.all());
         let (first, first_numbers) = (contact_before.before(strip, 0), contact_before.all());

@@ -137,7 +137,7 @@ impl Walls {
             self.known.fill(false);
         }
         self.strips.clear();
-        let active = liquid.active.active();
+        let active = &liquid.active.active;
         for row in (0..self.rows.len()).filter(|&row| self.rows[row]) {
             let strips = liquid.active.strips(row).filter(|&strip| active[strip]);
             self.strips.extend(strips.map(|strip| strip as u32));

@@ -190,14 +190,9 @@ impl Network {
         let i = column as usize;
         if self.party_of[i] == NONE {
             self.party_of[i] = self.parties.len() as u32;
-            let room = columns.ceilings()[i] - columns.bases()[i] - depth[i];
-            self.parties.push(Party {
-                column,
-                has: i64::from(depth[i]),
-                room: i64::from(room),
-                gives: 0,
-                takes: 0,
-            });
+            let has = i64::from(depth[i]);
+            let room = i64::from(columns.ceilings()[i] - columns.bases()[i] - depth[i]);
+            self.parties.push(Party { column, has, room, gives: 0, takes: 0 });
         }
         self.party_of[i]
     }

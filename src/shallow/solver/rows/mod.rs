@@ -109,7 +109,7 @@ impl Rows {
     #[inline(always)]
     fn drive<K: Kind>(&mut self, step: &Step, ground: &Ground, parts: &mut Parts, row: usize) -> bool {
         let Ground { columns, pipes, active, fast, .. } = ground;
-        let (light, is_fast) = (fast.light(), fast.row(row));
+        let (light, is_fast) = (&fast.light, fast.row(row));
         let (walls, is_walled) = (ground.walls, K::VISCOUS && !K::WHOLE && ground.walls.row(row));
         let start = columns.row(row).start * STRIP;
         let buffer = &mut self.ring[row % RING];
@@ -146,7 +146,7 @@ impl Rows {
                     south_depth,
                     open: [&pipes.east[first..], &pipes.south[first..]],
                     light: &light[first..],
-                    is_light: &fast.strips()[first / STRIP..],
+                    is_light: &fast.strips[first / STRIP..],
                 };
                 let (mine, at) = (mine..mine + len, at..at + len);
                 let carried = Carried {
@@ -316,7 +316,7 @@ impl Rows {
             let depth = &mut part.depth[mine..mine + len];
             move_units(&around, depth, &mut deepest);
             let strip = span.first / STRIP as u32;
-            let marks = [ground.active.wet(), ground.active.moving()].map(|marks| &marks[strip as usize..]);
+            let marks = [&ground.active.wet, &ground.active.moving].map(|marks| &marks[strip as usize..]);
             find_woken(&around, depth, marks, |position| woken.push(strip + position as u32));
         }
         deepest.into_iter().fold(ground.active.asleep_depth(row), i32::max)

@@ -23,7 +23,7 @@ use std::ops::Range;
 use crate::error::{Error, Result};
 use crate::geometry::Vec3;
 use crate::numeric::lists::reset;
-use crate::shallow::columns::grid::check_cells;
+use crate::shallow::columns::grid::{Cells, check_cells};
 use crate::shallow::columns::{Columns, STRIP, Strip};
 use crate::shallow::surface::quartets::links::{Scene, find_above};
 
@@ -86,7 +86,7 @@ struct Triple {
 /// The cells whose columns are recomputed, and lengths in units.
 struct Area<'a> {
     scene: Scene<'a>,
-    cells: [Range<usize>; 2],
+    cells: Cells,
     cell: f64,
     least: f64,
     margin: f64,
@@ -152,7 +152,7 @@ impl Lifts {
         positions: &[Vec3],
         triangles: &[[u32; 3]],
         distance: Distance,
-        cells: [Range<usize>; 2],
+        cells: Cells,
     ) -> Result<Fitted> {
         let size = columns.grid.size;
         let Distance { least, margin, rim } = distance;

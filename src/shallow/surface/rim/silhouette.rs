@@ -92,7 +92,7 @@ impl Silhouette {
         let mut ledges = Ledges::default();
         ledges.find(columns);
         films.count(columns, &Depths { depth: film, ledges: Some(&ledges), ..Depths::default() })?;
-        films.skirts.hems().clone_into(hems);
+        films.skirts.hems.clone_into(hems);
         Ok(())
     }
 

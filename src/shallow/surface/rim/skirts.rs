@@ -23,7 +23,7 @@ pub(in crate::shallow::surface) struct Skirts {
     /// The edges that have a skirt.
     open: Vec<[u32; 2]>,
     /// Hems, in order of their vertices, and the first of these.
-    hems: Vec<Hem>,
+    pub(super) hems: Vec<Hem>,
     first: u32,
     /// For each column, the position of its hem, or [`NONE`], to which all are reset between surfaces.
     positions: Vec<u32>,
@@ -85,11 +85,6 @@ impl Skirts {
         edges.iter().for_each(|[from, _]| ways[*from as usize] = 0);
         hems.iter_mut().for_each(|hem| ledges.reach(hem));
         [hems.len(), 6 * open.len()]
-    }
-
-    /// The hems, in order of their vertices.
-    pub fn hems(&self) -> &[Hem] {
-        &self.hems
     }
 
     /// Writes the hems after all other vertices.

@@ -12,7 +12,7 @@ use crate::geometry::{DVec3, TriMesh};
 /// A mesh that does not move and has a front.
 #[derive(Clone)]
 pub struct Ground {
-    shell: Shell,
+    pub(in crate::snow::grains) shell: Shell,
 }
 
 /// Friction of grains against the floor, ground and static meshes.
@@ -42,11 +42,6 @@ impl Ground {
     /// Whether a position (m) is behind it, at most `within` (m) deep.
     pub fn is_behind(&self, position: DVec3, within: f64) -> bool {
         self.shell.is_behind(position, within)
-    }
-
-    /// Its collider.
-    pub(in crate::snow::grains) fn shell(&self) -> &Shell {
-        &self.shell
     }
 }
 

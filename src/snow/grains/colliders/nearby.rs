@@ -6,7 +6,7 @@ use super::shell::{Best, Nearest, Shell};
 use crate::geometry::DVec3;
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::{LANES, Lanes};
-use crate::snow::grains::solver::rows::{dot, scaled, sub};
+use crate::snow::grains::solver::rows::{V8, dot, scaled, sub};
 
 /// The leaves of a mesh near some positions.
 #[derive(Default)]
@@ -38,7 +38,7 @@ struct Boxes {
 impl Nearby {
     /// Collects the leaves of a mesh that may be within a distance (m), plus their displacement, of positions in a box.
     pub fn find(&mut self, shell: &Shell, [low, high]: &[DVec3; 2], within: f64) {
-        let room = DVec3::repeat(within + shell.way());
+        let room = DVec3::repeat(within + shell.way);
         let bounds = [low - room, high + room];
         self.which.clear();
         self.boxes.clear();
@@ -100,15 +100,15 @@ const ROUNDING: f64 = 4.0e-6;
 
 /// Eight triangles relative to the middle (m). Unused lanes are far away.
 struct Triangles {
-    corner: [Lanes; 3],
+    corner: V8,
     /// The edges from that corner.
-    sides: [[Lanes; 3]; 2],
+    sides: [V8; 2],
     /// 1 over the squared lengths of these edges and of the third one.
-    inverse: [Lanes; 3],
+    inverse: V8,
     /// The dot product with a position in the triangle's plane is the barycentric weight of the edge's end.
-    weights: [[Lanes; 3]; 2],
+    weights: [V8; 2],
     /// Of unit length.
-    normal: [Lanes; 3],
+    normal: V8,
     /// Error bound of a distance (m).
     error: f64,
 }
@@ -166,12 +166,12 @@ impl Triangles {
 /// Position of lanes without a triangle (m): small enough that its square is finite.
 const FAR: f32 = 1.0e9;
 
-fn prepared(corners: &[[Lanes; 3]; 3]) -> Triangles {
-    dispatch!(prepare(corners: &[[Lanes; 3]; 3]) -> Triangles)
+fn prepared(corners: &[V8; 3]) -> Triangles {
+    dispatch!(prepare(corners: &[V8; 3]) -> Triangles)
 }
 
 #[inline(always)]
-fn prepare([a, b, c]: &[[Lanes; 3]; 3]) -> Triangles {
+fn prepare([a, b, c]: &[V8; 3]) -> Triangles {
     let (ab, ac, bc) = (sub(*b, *a), sub(*c, *a), sub(*c, *b));
     let one = Lanes::all(1.0);
     let (d00, d01, d11) = (dot(ab, ab), dot(ab, ac), dot(ac, ac));
@@ -214,26 +214,20 @@ fn squares_of(triangles: &Triangles, position: [f32; 3]) -> Lanes {
 
 /// The dot product of the result with a position, relative to the common corner, is the weight of the end of `side`.
 #[inline(always)]
-fn weight(
-    side: &[Lanes; 3],
-    of_other: Lanes,
-    other: &[Lanes; 3],
-    of_both: Lanes,
-    inverse: Lanes,
-) -> [Lanes; 3] {
+fn weight(side: &V8, of_other: Lanes, other: &V8, of_both: Lanes, inverse: Lanes) -> V8 {
     scaled(sub(scaled(*side, of_other), scaled(*other, of_both)), inverse)
 }
 
 /// Squared distances (m2) of edges from positions relative to the start of each edge.
 #[inline(always)]
-fn side(position: &[Lanes; 3], side: &[Lanes; 3], inverse: Lanes) -> Lanes {
+fn side(position: &V8, side: &V8, inverse: Lanes) -> Lanes {
     let along = (dot(*position, *side) * inverse).max(Lanes::all(0.0)).min(Lanes::all(1.0));
     let off = sub(*position, scaled(*side, along));
     dot(off, off)
 }
 
 #[inline(always)]
-fn cross(a: &[Lanes; 3], b: &[Lanes; 3]) -> [Lanes; 3] {
+fn cross(a: &V8, b: &V8) -> V8 {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 

@@ -55,9 +55,9 @@ pub struct Travel {
 impl Travel {
     /// Travel of meshes, with grains of a diameter (m).
     pub fn of(shells: &[&Shell], diameter: f64) -> Self {
-        let farthest = shells.iter().map(|shell| shell.way()).fold(0.0, f64::max);
+        let farthest = shells.iter().map(|shell| shell.way).fold(0.0, f64::max);
         let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
-        let bounds = shells.iter().map(|shell| shell.bounds_of_ways());
+        let bounds = shells.iter().map(|shell| &shell.bounds_of_ways);
         let [least, greatest] =
             bounds.fold(none, |[low, high], [least, greatest]| [low.inf(least), high.sup(greatest)]);
         let middle = (least + greatest) * 0.5;
@@ -92,7 +92,7 @@ impl Search<'_> {
     /// sub-steps; snow is compacted instead. Contacts dissipate energy: apart from falling, no grain becomes faster than whatever drives
     /// them all.
     pub fn fastest(&self, fastest: f32, restitution: f32, gravity: f32) -> f32 {
-        let Some(way) = self.shells.iter().map(|shell| shell.way()).reduce(f64::max) else {
+        let Some(way) = self.shells.iter().map(|shell| shell.way).reduce(f64::max) else {
             return f32::INFINITY;
         };
         let thrown = (way / self.dt) as f32 * (1.0 + restitution);
@@ -228,7 +228,7 @@ mod tests {
                 let rest = DVec3::from(way) / 0.1 - DVec3::from(corner);
                 assert!(rest.norm() <= travel.beside + 1.0e-6, "{travel:?} for {way:?}");
             }
-            assert!(travel.most() <= ALONG * shell.way() / 0.1 + 1.0e-6, "{travel:?}");
+            assert!(travel.most() <= ALONG * shell.way / 0.1 + 1.0e-6, "{travel:?}");
         }
         assert!(Travel::of(&[&moved([along; 3])], 0.1).beside < 1.0e-6);
     }

@@ -40,9 +40,9 @@ pub struct Shell {
     ways: Vec<f64>,
     leaves: usize,
     /// Largest displacement of a vertex in the sub-step (m).
-    way: f64,
+    pub(super) way: f64,
     /// Bounds of the displacements (m).
-    bounds_of_ways: [DVec3; 2],
+    pub(super) bounds_of_ways: [DVec3; 2],
 }
 
 /// Below this distance (m) from its nearest point, a position takes the triangle's normal as the outward direction.
@@ -185,16 +185,6 @@ impl Shell {
             inner[node] = [a[0].inf(&b[0]), a[1].sup(&b[1])];
             inner_ways[node] = way.max(other);
         }
-    }
-
-    /// Largest displacement of a vertex in the sub-step (m).
-    pub fn way(&self) -> f64 {
-        self.way
-    }
-
-    /// Minimum and maximum displacement of a vertex in the sub-step along each axis (m).
-    pub fn bounds_of_ways(&self) -> &[DVec3; 2] {
-        &self.bounds_of_ways
     }
 
     /// Finds the largest displacement and the bounds of all displacements.

@@ -3,7 +3,7 @@
 use super::density::SURROUNDED;
 use super::pairs::Batch;
 use super::rest::{self, Rest};
-use super::rows::{Part, Row, SUPPORTED, Shared, V, add, dot, scaled, sub};
+use super::rows::{Part, Row, SUPPORTED, Shared, V, V8, add, dot, scaled, sub};
 use crate::numeric::lanes::{LaneMask, Lanes};
 
 /// Share of an overlap that a sub-step removes.
@@ -28,8 +28,6 @@ const LIGHTER_ABOVE: f32 = 0.2;
 const LEAST: f32 = 1.0e-6;
 /// Minimum upward component of the direction from a grain to one that it supports.
 pub const STEEP: f32 = 0.2;
-
-type V8 = [Lanes; 3];
 
 /// Eight grains of a batch.
 #[derive(Clone, Copy)]

@@ -7,6 +7,8 @@ use crate::numeric::lanes::{LANES, Lanes};
 
 /// Three components.
 pub type V = [f32; 3];
+/// Three components of eight vectors.
+pub type V8 = [Lanes; 3];
 
 /// A grain during a step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
