@@ -1055,7 +1055,7 @@ typedef struct frz_pool frz_pool;
 /**
  * A small amount of liquid on the ground (blood, coffee or paint), computed in a fraction of a frame's time.
  *
- * In real time: calls that a host makes in each frame follow stricter rules than all others. These calls are frz_shallow_step, _replay,
+ * Real-time calls, which a host makes in each frame, follow stricter rules than all others. These calls are frz_shallow_step, _replay,
  * _update_terrain, _update_heights, _set_bodies, _loads, _save, _restore, _surface, _find_lifts, _find_ledges, _drops, _drops_mesh,
  * _read_scalar and _probe, frz_shallow_stains_update, _read and _soaked, and frz_shallow_snapshot_take, _surface, _drops, _drops_mesh and
  * _probe. With a pool of 0 threads, from their second call on, they allocate nothing, take no lock, log and poll nothing, and make no
@@ -4450,7 +4450,7 @@ frz_status frz_shallow_set_params(frz_shallow *shallow,
                                   const frz_shallow_params *params);
 
 /**
- * Computes a frame, in real time (frz_shallow), in steps as frz_shallow_params.pace states.
+ * Computes a frame (a real-time call: see frz_shallow), in steps as frz_shallow_params.pace states.
  *
  * dt: length of the frame (s), 1e-12 to 1e6. FRZ_ERROR_ARGUMENT also if it would take over a million steps: the liquid is then as it was.
  * budget_seconds: CPU time of this thread (s), or elapsed time if several threads work, after which no step begins, 0 to 1e6; 0: no limit.
@@ -4467,7 +4467,7 @@ frz_status frz_shallow_step(frz_context *context,
                             frz_shallow_report *report);
 
 /**
- * Computes a frame with given steps, in real time (frz_shallow): from the same state, with the same parameters, flow points and bodies,
+ * Computes a frame with given steps (a real-time call: see frz_shallow): from the same state, with the same parameters, flow points and bodies,
  * the result has the same bytes as the frame that the steps were reported for.
  *
  * steps: double for each step, its length (s), 1e-12 to 1e6, as frz_shallow_last_steps listed them: 1 to 1000000 steps, together up to 1e6
@@ -4565,7 +4565,7 @@ frz_status frz_shallow_set_depths(frz_shallow *shallow,
 frz_status frz_shallow_get_balance(const frz_shallow *shallow, frz_shallow_balance *balance);
 
 /**
- * Moves the vertices of the mesh that the liquid was created with, in real time (frz_shallow): bones and organs move or deform. The liquid
+ * Moves the vertices of the mesh that the liquid was created with (a real-time call: see frz_shallow): bones and organs move or deform. The liquid
  * is carried along, and none of it is lost; flow points on triangles move with them. After a failure all is as it was.
  *
  * positions: float[3] for each vertex (m), finite, in the mesh's order.
@@ -4582,7 +4582,7 @@ frz_status frz_shallow_update_terrain(frz_context *context,
                                       frz_shallow_moved *moved);
 
 /**
- * Changes the heights of the height field that the liquid was created with, in real time (frz_shallow). The liquid is carried along, and
+ * Changes the heights of the height field that the liquid was created with (a real-time call: see frz_shallow). The liquid is carried along, and
  * none of it is lost. After a failure all is as it was.
  *
  * heights: float for each cell of the domain (m), finite, as in frz_shallow_create_heights.
@@ -4598,7 +4598,7 @@ frz_status frz_shallow_update_heights(frz_context *context,
                                       frz_shallow_moved *moved);
 
 /**
- * Sets the solids that move over the ground, replacing those before, in real time (frz_shallow): the ground is rebuilt where one moves,
+ * Sets the solids that move over the ground, replacing those before (a real-time call: see frz_shallow): the ground is rebuilt where one moves,
  * and no triangle is visited. The liquid is displaced, and none of it is lost. After a failure all is as it was.
  *
  * A body is identified by its index: keep it at the same one from call to call. Bodies that do not move cost nothing.
@@ -4649,7 +4649,7 @@ frz_status frz_shallow_lend(const frz_shallow *shallow,
                             frz_view *out);
 
 /**
- * Reads the liquid at points, in real time (frz_shallow): from the column that contains a point, or else the nearest one above or below
+ * Reads the liquid at points (a real-time call: see frz_shallow): from the column that contains a point, or else the nearest one above or below
  * it.
  *
  * points: double[3] for each (m).
@@ -4678,7 +4678,7 @@ frz_status frz_shallow_volume(const frz_shallow *shallow,
                               double *volume);
 
 /**
- * Saves all that the next frame depends on besides the ground, the parameters, the flow points and the bodies, in real time (frz_shallow):
+ * Saves all that the next frame depends on besides the ground, the parameters, the flow points and the bodies (a real-time call: see frz_shallow):
  * for a replay, an undo, a host's own cache. The bytes are the same on any number of threads.
  *
  * dst: room for capacity bytes. NULL: only the current size is reported; it grows with the wet area of the ground.
@@ -4694,7 +4694,7 @@ frz_status frz_shallow_save(frz_context *context,
                             size_t *size);
 
 /**
- * Replaces the liquid's state by a saved one, in real time (frz_shallow): from there it flows as the saved one did, to the same bytes,
+ * Replaces the liquid's state by a saved one (a real-time call: see frz_shallow): from there it flows as the saved one did, to the same bytes,
  * with the same parameters, flow points and bodies, which must be set before. The volumes moved by flow points are restored too.
  *
  * state: bytes bytes of frz_shallow_save. FRZ_ERROR_FILE, with the liquid unchanged, if they are damaged, or of another version, another
@@ -4731,7 +4731,7 @@ frz_status frz_shallow_surface_bound(const frz_shallow *shallow,
                                      frz_shallow_size *size);
 
 /**
- * Writes the liquid's surface as triangles, in real time (frz_shallow): the wet columns and the dry ones around them. It ends at the
+ * Writes the liquid's surface as triangles (a real-time call: see frz_shallow): the wet columns and the dry ones around them. It ends at the
  * centres of the outermost cells. Vertices are in the order of their columns' indices, followed by those next to walls, and last those on
  * the ground's edges.
  *
@@ -4816,7 +4816,7 @@ frz_status frz_shallow_set_poured(frz_shallow *shallow,
 frz_status frz_shallow_set_sourced(frz_shallow *shallow, size_t flow, frz_view concentrations);
 
 /**
- * Copies the concentrations of a scalar, in real time (frz_shallow); 0 where it is dry.
+ * Copies the concentrations of a scalar (a real-time call: see frz_shallow); 0 where it is dry.
  *
  * scalar: its index, from 0.
  * columns: uint32_t for each requested column, its index; data NULL with a count of 0: all indices, in order.
@@ -4842,7 +4842,7 @@ frz_status frz_shallow_get_scalar_balance(const frz_shallow *shallow,
                                           frz_shallow_scalar_balance *balance);
 
 /**
- * Lists the drops in the air, in the order in which they left their edges, in real time (frz_shallow).
+ * Lists the drops in the air, in the order in which they left their edges (a real-time call: see frz_shallow).
  *
  * dst: room for a frz_shallow_drop for each, at most frz_shallow_params.falls_most. With data NULL only the count is reported.
  *     FRZ_ERROR_CAPACITY if it is too small.
@@ -4855,7 +4855,7 @@ frz_status frz_shallow_drops(const frz_shallow *shallow,
                              size_t *count);
 
 /**
- * Lists the drops that were in the air when a snapshot was taken, as frz_shallow_drops does, in real time (frz_shallow).
+ * Lists the drops that were in the air when a snapshot was taken, as frz_shallow_drops does (a real-time call: see frz_shallow).
  *
  * dst: as in frz_shallow_drops.
  * count: as in frz_shallow_drops.
@@ -4876,7 +4876,7 @@ frz_status frz_shallow_snapshot_drops(const frz_shallow_snapshot *snapshot,
 frz_status frz_shallow_drops_bound(const frz_shallow *shallow, frz_shallow_size *size);
 
 /**
- * Writes the liquid in the air as triangles, in real time (frz_shallow): a sphere for each drop, and strands between consecutive drops
+ * Writes the liquid in the air as triangles (a real-time call: see frz_shallow): a sphere for each drop, and strands between consecutive drops
  * from one edge. The spheres' vertices come first, in the order of their drops.
  *
  * layout: NULL for the defaults; its depths and FRZ_SHALLOW_LIFTED are ignored.
@@ -4893,7 +4893,7 @@ frz_status frz_shallow_drops_mesh(frz_context *context,
                                   frz_shallow_size *size);
 
 /**
- * Writes the liquid that was in the air when a snapshot was taken, as frz_shallow_drops_mesh does, in real time (frz_shallow).
+ * Writes the liquid that was in the air when a snapshot was taken, as frz_shallow_drops_mesh does (a real-time call: see frz_shallow).
  *
  * context: not the one of the thread that computes.
  * layout: NULL for the defaults.
@@ -4909,7 +4909,7 @@ frz_status frz_shallow_snapshot_drops_mesh(frz_context *context,
                                            frz_shallow_size *size);
 
 /**
- * Reports the current load of the liquid on each body of frz_shallow_set_bodies, in real time (frz_shallow): the weight that buoys or
+ * Reports the current load of the liquid on each body of frz_shallow_set_bodies (a real-time call: see frz_shallow): the weight that buoys or
  * pushes it, the drag of the flow over it and of its own motion, and how much of it is submerged. The liquid below a body is that found by
  * the last step: make a step after frz_shallow_set_bodies first.
  *
@@ -4971,7 +4971,7 @@ frz_status frz_shallow_stains_update(frz_context *context,
                                      double *absorbed);
 
 /**
- * Copies how stained each vertex is, 0 to 1, in real time (frz_shallow).
+ * Copies how stained each vertex is, 0 to 1 (a real-time call: see frz_shallow).
  *
  * dst: room for a float for each vertex; FRZ_ERROR_CAPACITY if it is too small, and nothing is written.
  *
@@ -4980,7 +4980,7 @@ frz_status frz_shallow_stains_update(frz_context *context,
 frz_status frz_shallow_stains_read(const frz_shallow_stains *stains, frz_span dst);
 
 /**
- * Copies how soaked each vertex is, as a fraction of its capacity, 0 to 1, in real time (frz_shallow); 0 where the ground does not absorb.
+ * Copies how soaked each vertex is, as a fraction of its capacity, 0 to 1 (a real-time call: see frz_shallow); 0 where the ground does not absorb.
  *
  * dst: as in frz_shallow_stains_read.
  *
@@ -5049,7 +5049,7 @@ frz_status frz_shallow_snapshot_create(frz_context *context,
                                        frz_shallow_snapshot **out);
 
 /**
- * Replaces the contents of a snapshot by a liquid's current state, in real time (frz_shallow).
+ * Replaces the contents of a snapshot by a liquid's current state (a real-time call: see frz_shallow).
  *
  * snapshot: of this liquid or any other. FRZ_ERROR_BUSY while another thread draws it.
  *
@@ -5067,7 +5067,7 @@ frz_status frz_shallow_snapshot_take(frz_shallow_snapshot *snapshot, const frz_s
 void frz_shallow_snapshot_destroy(frz_shallow_snapshot *snapshot);
 
 /**
- * Writes the surface that the liquid had when the snapshot was taken, as frz_shallow_surface does, in real time (frz_shallow).
+ * Writes the surface that the liquid had when the snapshot was taken, as frz_shallow_surface does (a real-time call: see frz_shallow).
  *
  * context: not the one of the thread that computes.
  * layout: NULL for the defaults.
@@ -5083,7 +5083,7 @@ frz_status frz_shallow_snapshot_surface(frz_context *context,
                                         frz_shallow_size *size);
 
 /**
- * Reads the liquid at points as it was when the snapshot was taken, as frz_shallow_probe does, in real time (frz_shallow).
+ * Reads the liquid at points as it was when the snapshot was taken, as frz_shallow_probe does (a real-time call: see frz_shallow).
  *
  * points: double[3] for each (m).
  * dst: room for a frz_shallow_sample for each; FRZ_ERROR_CAPACITY if it is too small, and nothing is written.

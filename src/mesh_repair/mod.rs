@@ -92,7 +92,8 @@ pub struct RepairReport {
 const TRIES: usize = 32;
 /// How often slivers are removed.
 const ROUNDS: usize = 4;
-/// Bytes for each cell face's area of the mesh: up to 1.7 edges of the grid, some 150 bytes each while they are sorted.
+/// Bytes for each part of the mesh as large as a cell's face: it pierces up to 1.7 edges of the grid, some 150 bytes each while they are
+/// sorted.
 const FACE: f64 = 256.0;
 /// Number of cell sizes tried if nothing would be left: the requested one, then half of the previous one each time.
 const HALVINGS: u32 = 6;

@@ -34,7 +34,7 @@ pub struct Shallow {
     pub(super) remap: Remap,
     pub(super) falls: Falling,
     pub(super) thick: Thick,
-    /// Copy of the state at the beginning of a frame that may take long.
+    /// The state before the frame, kept if the frame may take so long that it can be cancelled: it is put back then.
     pub(super) kept: SavedState,
     /// Cells that belong to another liquid.
     pub(super) apart: Option<ExcludedCells>,

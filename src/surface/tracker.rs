@@ -165,7 +165,7 @@ impl Tracker {
         Ok(StepReport { phases, ..self.adopt(next) })
     }
 
-    /// The mesh after a step as far as it follows from where the particles have carried its vertices, and what became of each of these.
+    /// The mesh after a step, before it is rebuilt: its carried vertices are projected. Also the result of the projection for each vertex.
     fn placed(
         &self,
         ctx: &Context,

@@ -44,7 +44,7 @@ impl From<Droplet> for frz_shallow_drop {
     }
 }
 
-/// Lists the drops in the air, in the order in which they left their edges, in real time (frz_shallow).
+/// Lists the drops in the air, in the order in which they left their edges (a real-time call: see frz_shallow).
 ///
 /// dst: room for a frz_shallow_drop for each, at most frz_shallow_params.falls_most. With data NULL only the count is reported.
 ///     FRZ_ERROR_CAPACITY if it is too small.
@@ -64,7 +64,7 @@ pub unsafe extern "C" fn frz_shallow_drops(
     })
 }
 
-/// Lists the drops that were in the air when a snapshot was taken, as frz_shallow_drops does, in real time (frz_shallow).
+/// Lists the drops that were in the air when a snapshot was taken, as frz_shallow_drops does (a real-time call: see frz_shallow).
 ///
 /// dst: as in frz_shallow_drops.
 /// count: as in frz_shallow_drops.
@@ -175,7 +175,7 @@ pub unsafe extern "C" fn frz_shallow_drops_bound(
     }
 }
 
-/// Writes the liquid in the air as triangles, in real time (frz_shallow): a sphere for each drop, and strands between consecutive drops
+/// Writes the liquid in the air as triangles (a real-time call: see frz_shallow): a sphere for each drop, and strands between consecutive drops
 /// from one edge. The spheres' vertices come first, in the order of their drops.
 ///
 /// layout: NULL for the defaults; its depths and FRZ_SHALLOW_LIFTED are ignored.
@@ -202,7 +202,7 @@ pub unsafe extern "C" fn frz_shallow_drops_mesh(
     }
 }
 
-/// Writes the liquid that was in the air when a snapshot was taken, as frz_shallow_drops_mesh does, in real time (frz_shallow).
+/// Writes the liquid that was in the air when a snapshot was taken, as frz_shallow_drops_mesh does (a real-time call: see frz_shallow).
 ///
 /// context: not the one of the thread that computes.
 /// layout: NULL for the defaults.

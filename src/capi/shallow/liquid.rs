@@ -156,7 +156,7 @@ pub unsafe extern "C" fn frz_shallow_set_params(
     guard(|| unsafe { Ok(change(shallow)?.shallow.set_params(given(params)?.params()?)?) })
 }
 
-/// Computes a frame, in real time (frz_shallow), in steps as frz_shallow_params.pace states.
+/// Computes a frame (a real-time call: see frz_shallow), in steps as frz_shallow_params.pace states.
 ///
 /// dt: length of the frame (s), 1e-12 to 1e6. FRZ_ERROR_ARGUMENT also if it would take over a million steps: the liquid is then as it was.
 /// budget_seconds: CPU time of this thread (s), or elapsed time if several threads work, after which no step begins, 0 to 1e6; 0: no limit.
@@ -186,7 +186,7 @@ pub unsafe extern "C" fn frz_shallow_step(
     }
 }
 
-/// Computes a frame with given steps, in real time (frz_shallow): from the same state, with the same parameters, flow points and bodies,
+/// Computes a frame with given steps (a real-time call: see frz_shallow): from the same state, with the same parameters, flow points and bodies,
 /// the result has the same bytes as the frame that the steps were reported for.
 ///
 /// steps: double for each step, its length (s), 1e-12 to 1e6, as frz_shallow_last_steps listed them: 1 to 1000000 steps, together up to 1e6

@@ -45,7 +45,7 @@ unsafe fn put(dst: *mut frz_shallow_load, loads: impl ExactSizeIterator<Item = L
     Ok(())
 }
 
-/// Reports the current load of the liquid on each body of frz_shallow_set_bodies, in real time (frz_shallow): the weight that buoys or
+/// Reports the current load of the liquid on each body of frz_shallow_set_bodies (a real-time call: see frz_shallow): the weight that buoys or
 /// pushes it, the drag of the flow over it and of its own motion, and how much of it is submerged. The liquid below a body is that found by
 /// the last step: make a step after frz_shallow_set_bodies first.
 ///

@@ -251,7 +251,7 @@ pub struct frz_shallow_sample {
 // SAFETY: numbers, without padding.
 unsafe impl Plain for frz_shallow_sample {}
 
-/// Reads the liquid at points, in real time (frz_shallow): from the column that contains a point, or else the nearest one above or below
+/// Reads the liquid at points (a real-time call: see frz_shallow): from the column that contains a point, or else the nearest one above or below
 /// it.
 ///
 /// points: double[3] for each (m).

@@ -161,7 +161,7 @@ pub(in crate::capi) unsafe fn with_concentrations(
     Ok(set(&numbers[..count])?)
 }
 
-/// Copies the concentrations of a scalar, in real time (frz_shallow); 0 where it is dry.
+/// Copies the concentrations of a scalar (a real-time call: see frz_shallow); 0 where it is dry.
 ///
 /// scalar: its index, from 0.
 /// columns: uint32_t for each requested column, its index; data NULL with a count of 0: all indices, in order.

@@ -88,7 +88,7 @@ pub unsafe extern "C" fn frz_shallow_snapshot_create(
 /// surface.
 const BYTES: u64 = 72;
 
-/// Replaces the contents of a snapshot by a liquid's current state, in real time (frz_shallow).
+/// Replaces the contents of a snapshot by a liquid's current state (a real-time call: see frz_shallow).
 ///
 /// snapshot: of this liquid or any other. FRZ_ERROR_BUSY while another thread draws it.
 ///
@@ -119,7 +119,7 @@ pub unsafe extern "C" fn frz_shallow_snapshot_destroy(snapshot: *mut frz_shallow
     guard(|| unsafe { destroy(snapshot) });
 }
 
-/// Writes the surface that the liquid had when the snapshot was taken, as frz_shallow_surface does, in real time (frz_shallow).
+/// Writes the surface that the liquid had when the snapshot was taken, as frz_shallow_surface does (a real-time call: see frz_shallow).
 ///
 /// context: not the one of the thread that computes.
 /// layout: NULL for the defaults.
@@ -156,7 +156,7 @@ pub unsafe extern "C" fn frz_shallow_snapshot_surface(
     }
 }
 
-/// Reads the liquid at points as it was when the snapshot was taken, as frz_shallow_probe does, in real time (frz_shallow).
+/// Reads the liquid at points as it was when the snapshot was taken, as frz_shallow_probe does (a real-time call: see frz_shallow).
 ///
 /// points: double[3] for each (m).
 /// dst: room for a frz_shallow_sample for each; FRZ_ERROR_CAPACITY if it is too small, and nothing is written.

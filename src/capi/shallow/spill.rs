@@ -11,7 +11,7 @@ use crate::shallow::{Load, Moved, Shallow};
 
 /// A small amount of liquid on the ground (blood, coffee or paint), computed in a fraction of a frame's time.
 ///
-/// In real time: calls that a host makes in each frame follow stricter rules than all others. These calls are frz_shallow_step, _replay,
+/// Real-time calls, which a host makes in each frame, follow stricter rules than all others. These calls are frz_shallow_step, _replay,
 /// _update_terrain, _update_heights, _set_bodies, _loads, _save, _restore, _surface, _find_lifts, _find_ledges, _drops, _drops_mesh,
 /// _read_scalar and _probe, frz_shallow_stains_update, _read and _soaked, and frz_shallow_snapshot_take, _surface, _drops, _drops_mesh and
 /// _probe. With a pool of 0 threads, from their second call on, they allocate nothing, take no lock, log and poll nothing, and make no

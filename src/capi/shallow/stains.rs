@@ -166,7 +166,7 @@ pub unsafe extern "C" fn frz_shallow_stains_update(
     })
 }
 
-/// Copies how stained each vertex is, 0 to 1, in real time (frz_shallow).
+/// Copies how stained each vertex is, 0 to 1 (a real-time call: see frz_shallow).
 ///
 /// dst: room for a float for each vertex; FRZ_ERROR_CAPACITY if it is too small, and nothing is written.
 ///
@@ -180,7 +180,7 @@ pub unsafe extern "C" fn frz_shallow_stains_read(
     guard(|| unsafe { dst.put("dst", read(stains)?.stains.each()) })
 }
 
-/// Copies how soaked each vertex is, as a fraction of its capacity, 0 to 1, in real time (frz_shallow); 0 where the ground does not absorb.
+/// Copies how soaked each vertex is, as a fraction of its capacity, 0 to 1 (a real-time call: see frz_shallow); 0 where the ground does not absorb.
 ///
 /// dst: as in frz_shallow_stains_read.
 ///

@@ -34,7 +34,8 @@ impl Flow {
 
     /// The same with [`Scheme::Bounded`], with mass conservation: a density that is not negative keeps the requested share of its mass, to
     /// rounding, and what the scheme loses or gains is restored within two tiles, or farther away if the density there would have to grow
-    /// by more than a fifth at once. Some is lost only if all of the density together would: of the last mist, which is thinner than `least`.
+    /// by more than a fifth at once. Mass is lost only if all of the density together would have to grow by more than that. This happens to
+    /// the last mist, thinner than `least`.
     ///
     /// # Errors
     /// Cancel; the fields are then invalid.
@@ -56,7 +57,8 @@ impl Flow {
     }
 }
 
-/// Advects velocity (m/s, at lower faces) and density for a step. The rim keeps its values, except for the upper faces of cells.
+/// Advects velocity (m/s, at lower faces) and density for a step. The rim (the tiles beside the active ones) keeps its values, except those
+/// at the upper faces of active cells, which are stored there.
 ///
 /// # Errors
 /// Cancel; the fields are then invalid.
@@ -108,7 +110,7 @@ fn carry_faces(
         ctx.check()?;
         let live = paths.live(slot, at);
         if live.as_ref().is_none_or(|live| !live.is_whole()) {
-            // From the surrounding air, the guess is its value there after the step.
+            // In the rim, the guess is the velocity of the surrounding air, which has made this step already.
             *hat = match around {
                 Some(around) if slot >= paths.tiles.active() => {
                     around.read(window, paths.tiles.coords()[slot])

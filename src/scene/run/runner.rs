@@ -37,7 +37,7 @@ struct StageRun<'a> {
     todo: Vec<i32>,
     /// Number of wanted frames that are done.
     there: usize,
-    /// Ready to make the first of them, if it could be loaded before the upstream stages have run.
+    /// The pass, with the state before the first frame of `todo` loaded; none if the upstream stages must run first.
     start: Option<Box<dyn Pass + 'a>>,
     /// Frames removed because upstream stages are made again.
     forgotten: Vec<Manifest>,
@@ -117,8 +117,8 @@ impl<'a> Run<'a> {
         Ok(run)
     }
 
-    /// Refuses to make a frame if an upstream frame that it needs, or that a frame on the way to it from the state that is resumed needs,
-    /// neither exists nor will be made.
+    /// Making a frame starts from the latest kept state and passes through all frames between. This fails if one of these needs an upstream
+    /// frame that neither exists nor will be made.
     fn refuse_missing(
         &self,
         stage: &dyn Stage,

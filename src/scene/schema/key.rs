@@ -90,7 +90,7 @@ pub const fn optional(example: &'static str) -> Unset {
     Unset { fallback: Fallback::Nothing, ..or("") }.such_as(example)
 }
 
-/// An error; with an example.
+/// Leaving the key out is an error; with an example.
 pub const fn required(example: &'static str) -> Unset {
     Unset { fallback: Fallback::Required, ..or("") }.such_as(example)
 }
@@ -122,7 +122,8 @@ pub struct Key {
     pub kind: Kind,
     /// Its default.
     pub fallback: Fallback,
-    /// The default instead if the table's `preset`, or `liquid`, has one of these names, as a scene writes it.
+    /// Pairs of a name and a default: the default that replaces `fallback` if the table's `preset`, or `liquid`, has that name, as a scene
+    /// writes it.
     pub presets: &'static [(&'static str, &'static str)],
     /// Its line in a starter scene.
     pub example: Example,
@@ -146,7 +147,7 @@ impl Key {
         Self { meaning, ..self }
     }
 
-    /// The default instead if the table's `preset`, or `liquid`, has one of these names.
+    /// Pairs of a name and a default: the default that replaces `fallback` if the table's `preset`, or `liquid`, has that name.
     pub const fn with_presets(self, presets: &'static [(&'static str, &'static str)]) -> Self {
         Self { presets, ..self }
     }

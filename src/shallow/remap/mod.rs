@@ -82,7 +82,8 @@ impl Shallow {
 
     /// Replaces the solid shapes that move over the terrain.
     ///
-    /// Only the cells of shapes that differ from the previous shape of the same index are rebuilt, and no triangle is cast. As for
+    /// Only the cells of shapes that differ from the previous shape of the same index are rebuilt, and no line is intersected with
+    /// triangles again. As for
     /// [`Shallow::update_cells`], nothing is allocated, provided there are no more shapes than before.
     ///
     /// # Errors
@@ -120,7 +121,7 @@ impl Shallow {
         moved
     }
 
-    /// Rebuilds the dirty cells, from solids by their rank among them.
+    /// Rebuilds the dirty cells. `cast` gives the solids of a dirty cell by the cell's rank among the dirty cells.
     fn rebuild<'a>(&mut self, cast: impl Fn(usize) -> &'a [Solid]) -> Moved {
         let rows = self.remap.dirty.rows.clone();
         let volume = self.columns.grid.cell * self.columns.grid.cell * self.columns.heights.unit;

@@ -15,8 +15,8 @@ pub struct Step {
     pub drive: f32,
     /// 3 dt nu / unit^2 (units^2).
     pub drag: f32,
-    /// [`FAST_WAVES`](super::fast_films::FAST_WAVES) divided by `drive` (units). Divided by a depth: the factor by which the
-    /// inertia of a fast film is reduced.
+    /// [`FAST_WAVES`](super::fast_films::FAST_WAVES) divided by `drive` (units). This over a depth is the factor by which the inertia of a
+    /// fast film is reduced.
     pub lighter: f32,
     /// The maximum transfer of a pipe of a fast film in a step, as a fraction of the donor's depth.
     pub fastest: f32,
@@ -28,13 +28,13 @@ pub struct Step {
     pub thinning: Option<Thinning>,
     /// Surface of the liquid at rest beyond the border (units), or BOTTOMLESS: there is none.
     pub still: i32,
-    /// dt (g unit)^1/2 / dx: times the root of a depth (units), the distance (cells) that a wave travels in a step.
+    /// dt (g unit)^1/2 / dx: multiplied by the square root of a depth (units), it gives the distance (cells) that a wave travels in a step.
     pub wave: f32,
     /// What gravity adds to the drop of the surface over a cell, along x and along z (units).
     pub tilt: [i32; 2],
     /// 6/5 nu dt / dx^2: lateral friction (`lateral_friction`); 0: there is none.
     pub lateral: f32,
-    /// This step over the last one, which stored fluxes refer to.
+    /// The length of this step divided by that of the last one, which stored fluxes refer to.
     pub again: f32,
     /// Edge of a cell (units).
     pub cell: f32,
@@ -48,8 +48,8 @@ pub struct Step {
 /// Carreau's law, as a function of a flux and the donor's depth.
 #[derive(Debug, Clone, Copy)]
 pub struct Thinning {
-    /// 3 lambda dx / (dt unit), where dt is the step that fluxes are per: multiplied by flux / depth^2, it gives lambda times the shear
-    /// rate at the ground.
+    /// 3 lambda dx / (dt unit), where dt is the length of the step that fluxes refer to: multiplied by flux / depth^2, it gives lambda
+    /// times the shear rate at the ground.
     pub shear: f32,
     /// The minimum viscosity, as part of that at rest.
     pub thinnest: f32,
@@ -76,7 +76,7 @@ impl<const VISCOUS: bool, const WHOLE: bool, const THINS: bool> Kind for Of<VISC
     const THINS: bool = THINS;
 }
 
-/// An expression for the variant of a step, which it names: it is compiled for each.
+/// Evaluates `$run` with the type `$kind` bound to the step's variant. `$run` is compiled once for each variant.
 macro_rules! by_kind {
     ($step:expr, $kind:ident => $run:expr) => {
         by_kind!($step, $kind => $run;

@@ -16,12 +16,12 @@
 //! | extra | a vertex within a wall, to which the surface that ends there is extended |
 //!
 //! Two dry columns of a group need no link. Groups become one or two triangles, which face up. A group of four is divided along a diagonal:
-//! if only one diagonal has ends that are both wet or both dry, along that one; if one is wet and the other dry, along the wet one;
-//! otherwise along the one with the larger sum of heights, and if these are equal from north-west to south-east. The surface ends at the
-//! centres of the outermost cells.
+//! if only one diagonal has ends that are both wet or both dry, along that one; if both have, and one diagonal is wet and the other dry,
+//! along the wet one; otherwise along the one with the larger sum of heights, and if these are equal from north-west to south-east. The
+//! surface ends at the centres of the outermost cells.
 //!
-//! Where a group of four lacks one link, between two cells side by side, its two triangles overlap ([`Check::doubled`]): the liquid of
-//! these columns is on different layers there.
+//! Four columns that lack one link, between two cells side by side, are no group of four but two groups of three, whose triangles overlap
+//! ([`Check::doubled`]): the liquid of these columns is on different layers there.
 
 pub(super) mod buffers;
 pub mod counts;

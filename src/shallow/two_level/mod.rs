@@ -36,7 +36,7 @@ use ground::Ground;
 use rests::Rests;
 use seam::Seam;
 
-/// Tolerance for a side of a box to count as a side of cells (coarse cells).
+/// A side of a box that lies within this distance (edges of coarse cells) of a side of coarse cells counts as lying on it.
 const ROUNDING: f64 = 1e-6;
 /// Fine units in a coarse one.
 const FINE: i64 = 4;
@@ -54,7 +54,7 @@ pub struct Detail {
     /// For each coarse cell, the liquid that does not make up a coarse unit.
     pub(super) rest: Rests,
     points: Vec<FlowPoint>,
-    /// The state at the beginning of a frame that may take long.
+    /// The state before the frame, kept if the frame may take so long that it can be cancelled: it is put back then.
     kept: Vec<u8>,
 }
 
@@ -264,7 +264,8 @@ impl Detail {
         within(0, x) && within(1, z)
     }
 
-    /// Assigns each flow point to the cells of one size, with what it waits for and has moved.
+    /// Assigns each flow point to the cells of one size. The liquid that it has still to move, and the count of what it has moved, go with
+    /// it.
     fn route(&mut self) {
         for at in 0..self.points.len() {
             let is_near = self.is_near(&self.points[at]);

@@ -203,7 +203,7 @@ impl BaseLayer {
 
     /// Blocks (their minimum corners) that the last step changed, in any of the grids.
     pub fn dirty(&self) -> impl Iterator<Item = Origin> {
-        // Frames change where the snow changes, compression in the whole columns there.
+        // `touched` changes where the snow changes, `compression` in the whole columns there.
         self.changes
             .surface
             .iter()
@@ -322,8 +322,8 @@ impl BaseLayer {
         let middle = [0, 1, 2].map(|a| (f64::from(self.low[a]) + f64::from(self.high[a])) * 0.5 * cell);
         let lattice = Lattice::near(cell, DVec3::from(middle))?;
         let outside = self.half_width + noise.map_or(0.0, |noise| noise.amplitude);
-        // Whether a face is open depends on the winding numbers of the voxels around it; blocks are inside by their first voxel, which may
-        // lie outside the snow.
+        // Whether a face bounds the swept volume depends on the winding numbers of the voxels around it. A block without facets counts as
+        // inside if its first voxel is inside, and that voxel may lie outside the snow.
         let margin = outside.ceil() as i32 + 3 + DIM as i32;
         let relative = |voxel: [i32; 3], grow: i32| [0, 1, 2].map(|a| voxel[a] - lattice.origin[a] + grow);
         let fixed = |voxel: [i32; 3]| voxel.map(|cells| cells.saturating_mul(UNITS));

@@ -17,7 +17,7 @@
 //! | push | a displacement that removes overlap and never becomes velocity |
 //! | block, column | a cube of 8 x 8 x 8 diameters; a stack of blocks, the unit of work |
 //! | colour | one of four sets of columns; no two columns of a set share a grain |
-//! | anchor | the position of a grain that its pairs are found from, slightly ahead of the grain |
+//! | anchor | a position slightly ahead of a moving grain, from which its pairs are found |
 //! | rest | a grain that has lain still stops and supports others like the ground, until something wakes it |
 
 mod birth;

@@ -114,7 +114,7 @@ impl Implicit {
         self.states.get(&patch) == Some(&State::Inside)
     }
 
-    /// Patches next to those from `first` on into which the surface continues, ascending.
+    /// The neighbours, ascending, into which the surface continues from the patches with index `first` or above.
     fn open_sides(&self, first: usize) -> Vec<Coord> {
         let sides = |index: usize| {
             let (patch, values) = (self.patches[index], &self.values[index]);
@@ -225,7 +225,8 @@ impl Around<'_> {
         let radius = SUPPORT * self.spacing;
         let [low, high] = self.extent(patch, radius, self.cells.edge());
         let from = low;
-        // Converts edges of the grid's cells to cells, from the patch's first node.
+        // Offsets are in edges of the particle grid's cells. `scale` and `shift` turn them into cells of the function, relative to the
+        // patch's first node.
         let scale = self.cells.edge() / self.cell;
         let shift = [0, 1, 2].map(|axis| {
             ((f64::from(from[axis]) * self.cells.edge() - f64::from(patch[axis]) * self.edge()) / self.cell)

@@ -191,7 +191,7 @@ fn surveyed(
     (phi, distances): (&Implicit, &Distances),
 ) -> Result<(Shape, CellSet)> {
     let fixed = in_cells.iter().map(|position| lattice.fix(*position)).collect::<Result<Vec<_>>>()?;
-    // Some 100 bytes for each edge of the grid that the mesh pierces: up to 1.7 per unit of its area, in cell faces.
+    // Some 100 bytes for each edge of the grid that the mesh pierces: up to 1.7 edges for each cell face's worth of its area.
     let area = |names: &[u32; 3]| normal(&names.map(|name| in_cells[name as usize])).norm() / 2.0;
     let faces: f64 = unfit.triangles.iter().map(area).sum();
     ctx.allow("the mesh's cells (larger ones need less)", (170.0 * faces).min(1e18) as u64)?;
@@ -280,7 +280,7 @@ mod tests {
     #[test]
     fn two_balls_become_one_and_part_again() {
         let ctx = context(2);
-        // Together and apart, with a hollow in time to merge.
+        // The balls approach for 24 frames until they overlap, and then part again.
         let away = |frame: i32| 9.0 - 0.25 * f64::from(if frame < 24 { frame } else { 48 - frame });
         let at = |frame: i32| two_balls(5.5, DVec3::new(away(frame), 0.1, 0.2));
         let mut from = at(0);

@@ -50,7 +50,7 @@ impl EasingTargets {
         Self { ways: Vec::new(), origins: Some(vec![None; vertices]) }
     }
 
-    /// The vertex before the step that a vertex after it was; none: it is new.
+    /// The index that a vertex had before the step; none: it is new.
     pub fn before(&self, vertex: u32) -> Option<u32> {
         origin(&self.origins, vertex)
     }
@@ -117,7 +117,8 @@ fn weight(steps: usize, ahead: usize) -> f64 {
     gone * gone * (3.0 - 2.0 * gone)
 }
 
-/// The displacements (m) of the vertices that a change removes, by their index before it; limits are in spacings (m).
+/// The displacements (m) of the vertices that a change removes, by their index before it; a spacing, the unit of the limits, is `spacing` m
+/// long.
 fn ways(ctx: &Context, change: &Change, triangles: &[[u32; 3]], spacing: f64) -> Result<Vec<(u32, DVec3)>> {
     let Some(old) = Patch::old(change, triangles) else { return Ok(Vec::new()) };
     let new = Patch::new(change);

@@ -119,6 +119,8 @@ fn target(path: &Module, all: &BTreeMap<Module, (String, bool)>) -> (Module, Opt
 fn needs() -> BTreeMap<Module, BTreeSet<Module>> {
     let all = modules();
     let mut passed_on = BTreeMap::new();
+    // What a module passes on whole (`pub use other::*`).
+    let mut passed_whole: BTreeMap<Module, Vec<Module>> = BTreeMap::new();
     let mut named = BTreeMap::new();
     for (module, (code, _)) in &all {
         let (imports, rest) = imports(code);
@@ -128,7 +130,11 @@ fn needs() -> BTreeMap<Module, BTreeSet<Module>> {
             if is_public {
                 let name =
                     path.rsplit(" as ").next().unwrap().rsplit("::").next().unwrap().trim().to_string();
-                passed_on.insert((module.clone(), name), found);
+                if name == "*" {
+                    passed_whole.entry(module.clone()).or_default().push(target(&found, &all).0);
+                } else {
+                    passed_on.insert((module.clone(), name), found);
+                }
             } else {
                 paths.push(found);
             }
@@ -181,6 +187,9 @@ fn needs() -> BTreeMap<Module, BTreeSet<Module>> {
                 })
             };
             let is_free = *is_folder && (declares("trait ") || declares("const ") || declares("static "));
+            if item.as_deref() == Some("*") {
+                of.extend(passed_whole.get(&to).into_iter().flatten().filter(|to| **to != module).cloned());
+            }
             if to != module && !to.is_empty() && !is_free {
                 of.insert(to);
             }

@@ -384,7 +384,7 @@ pub unsafe extern "C" fn frz_shallow_surface_bound(
     unsafe { informs(size, || Ok(bound(read(shallow)?.shallow.columns()))) }
 }
 
-/// Writes the liquid's surface as triangles, in real time (frz_shallow): the wet columns and the dry ones around them. It ends at the
+/// Writes the liquid's surface as triangles (a real-time call: see frz_shallow): the wet columns and the dry ones around them. It ends at the
 /// centres of the outermost cells. Vertices are in the order of their columns' indices, followed by those next to walls, and last those on
 /// the ground's edges.
 ///

@@ -67,7 +67,7 @@ pub struct Writer {
     before: Option<Points>,
 }
 
-/// Grains are dropped this far below the ground and the snow (m).
+/// Grains that fall this far below the ground and the snow (m) are removed.
 const BELOW: f64 = 1.0;
 
 impl<'a> Grains<'a> {

@@ -2,9 +2,9 @@
 //! read or written is still in the cache for the next (thesis Alg. 4.1, lines 1 to 4).
 //!
 //! When the front is at row r, the fluxes and K_min of r are computed; with these the pipes of r - 1 can be scaled. Where there are
-//! ceilings, K_max of r - 1 follows, and K_max of r - 2 is refined with the room that outflow makes. The transfers of the row behind these
-//! are then final, and its depths change; no later stage reads that row again. A band starts some rows before its own rows and ends some
-//! rows after them, on copies, so that it computes the same values there as its neighbours.
+//! ceilings, K_max of r - 1 follows, and K_max of r - 2 is refined with the room that outflow makes. The transfers of row r - 3 (r - 1
+//! where there are no ceilings) are then final, and its depths change; no later stage reads that row again. A band starts some rows before
+//! its own rows and ends some rows after them, on copies, so that it computes the same values there as its neighbours.
 
 pub(super) mod band_views;
 pub(in crate::shallow) mod bands;
@@ -182,7 +182,8 @@ impl Rows {
         is_held
     }
 
-    /// Moves the network's units in a row, after the fluxes of that row, and closes the network's pipes there for the rest of the step.
+    /// Moves the units of the flooded pipes (the network of `pressurised`) in a row, after the fluxes of that row, and closes the network's
+    /// pipes there for the rest of the step.
     fn shut(&mut self, ground: &Ground, parts: &mut Parts, row: usize) {
         let (position, buffer) = (Place::new(ground.columns, row), &mut self.ring[row % RING]);
         let part = parts.of(row);
