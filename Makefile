@@ -25,6 +25,9 @@ demo: setup
 	rm -rf $(DEMO)
 	$(BUILD)
 	target/release/make_scenes $(DEMO)
+	target/release/frazil snow $(DEMO)/box.toml -o $(DEMO)/box
+	target/release/frazil preview $(DEMO)/box/base/base.0005.vdb -o $(DEMO)/box.png
+	@echo "The first picture: $(DEMO)/box.png"
 	target/release/frazil check $(DEMO)/hero.toml
 	target/release/frazil snow $(DEMO)/hero.toml -o $(DEMO)/hero
 	target/release/frazil preview $(DEMO)/hero --frames 66 -o $(DEMO)/hero.png --size 960x540 --eye=-1.75,1.2,3.1 --target 0.05,0.72,0.45 --fov 41 --sun 115,22 --fog-density 25
@@ -32,8 +35,6 @@ demo: setup
 	target/release/frazil snow $(DEMO)/walker.toml -o $(DEMO)/walker
 	target/release/frazil preview $(DEMO)/walker/base/base.0048.vdb -o $(DEMO)/walker.png
 	target/release/frazil preview $(DEMO)/walker/base/base.0048.vdb -o $(DEMO)/print.png --eye -0.05,1.1,1.2 --target 0.085,0.15,1.67 --fov 21 --sun 160,60
-	target/release/frazil snow $(DEMO)/box.toml -o $(DEMO)/box
-	target/release/frazil preview $(DEMO)/box/base/base.0005.vdb -o $(DEMO)/box.png
 	target/release/frazil snow $(DEMO)/cube.toml -o $(DEMO)/cube
 	target/release/frazil preview $(DEMO)/cube/base/base.0007.vdb -o $(DEMO)/cube.png
 	target/release/frazil snow $(DEMO)/ball.toml -o $(DEMO)/ball

@@ -13,6 +13,8 @@ use frazil::vdb::file::{read, read_any, to_bytes, write};
 const GRAINS: &str = "compression = 0.4";
 /// The cube of the shot pushes its grains slowly.
 const MIST: &str = "[mist]\nfrom_speed = 0.3";
+/// The same in larger cells: a fraction of the time.
+const COARSE: &str = "[mist]\nfrom_speed = 0.3\ncell = 0.05";
 
 /// Files of an output in some folders.
 pub fn files(at: &Path, out: &str, kinds: &[&str]) -> Vec<(String, Vec<u8>)> {
@@ -42,7 +44,7 @@ fn report(at: &Path, out: &str, frame: i32) -> serde_json::Value {
 
 #[test]
 fn mist_is_made_and_made_again_without_touching_base_and_grains() {
-    let at = &folder(GRAINS, MIST);
+    let at = &folder(GRAINS, COARSE);
     works(at, "snow shot.toml -o out -q");
     assert_eq!(files(at, "out", &["mist"]).len(), 10);
     let last = report(at, "out", 10);
@@ -52,7 +54,7 @@ fn mist_is_made_and_made_again_without_touching_base_and_grains() {
     else {
         panic!("a density of vectors")
     };
-    let cell = 0.02 * 4.0 / 3.0;
+    let cell = 0.05;
     assert!((density.voxel_size() - cell).abs() < 1e-12);
     assert!((density.index_to_world(DVec3::zeros()) - DVec3::repeat(0.5 * cell)).norm() < 1e-12);
     let leaves = density.leaves().unwrap();
@@ -89,7 +91,7 @@ fn mist_is_made_and_made_again_without_touching_base_and_grains() {
 
 #[test]
 fn a_killed_run_resumes_to_the_same_mist_from_any_number_of_threads() {
-    let at = &folder(GRAINS, &format!("fog = [\"mist\"]\n{MIST}\nturbulence = 3.0\nconfinement = 0.3"));
+    let at = &folder(GRAINS, &format!("fog = [\"mist\"]\n{COARSE}\nturbulence = 3.0\nconfinement = 0.3"));
     works(at, "snow shot.toml -o once -q --threads 2");
     for frame in [3, 6] {
         kill_at(at, "snow shot.toml -o killed", &format!("killed/state/mist.{frame:04}.json"));
@@ -107,8 +109,8 @@ fn a_killed_run_resumes_to_the_same_mist_from_any_number_of_threads() {
 
 #[test]
 fn caches_of_changes_give_the_same_mist() {
-    let delta = format!("base_mode = \"delta\"\ngrains_mode = \"delta\"\n{MIST}");
-    let [whole, delta] = &[folder(GRAINS, MIST), folder(GRAINS, &delta)];
+    let delta = format!("base_mode = \"delta\"\ngrains_mode = \"delta\"\n{COARSE}");
+    let [whole, delta] = &[folder(GRAINS, COARSE), folder(GRAINS, &delta)];
     works(whole, "snow shot.toml -o out -q");
     works(delta, "snow shot.toml -o out -q");
     assert!(grids(whole, "out") == grids(delta, "out"));
@@ -121,7 +123,7 @@ fn caches_of_changes_give_the_same_mist() {
 
 #[test]
 fn fog_takes_all_three_parts() {
-    let at = &folder(GRAINS, &format!("fog = [\"base\", \"grains\", \"mist\"]\n{MIST}"));
+    let at = &folder(GRAINS, &format!("fog = [\"base\", \"grains\", \"mist\"]\n{COARSE}"));
     works(at, "snow shot.toml -o out -q");
     let fog = read(&at.join("out/fog/fog.0010.vdb")).unwrap();
     assert_eq!(fog.iter().map(|grid| grid.name()).collect::<Vec<_>>(), ["base", "grains", "mist"]);
@@ -147,7 +149,7 @@ fn without_fast_grains_the_mist_is_empty_and_the_log_says_so() {
 fn cells_wider_than_objects_and_objects_wider_than_the_air_work() {
     let at = &folder(GRAINS, MIST);
     works(at, "snow shot.toml -o coarse -q --set mist.cell=0.5");
-    works(at, "snow shot.toml -o fine -q --frames 1-4 --set mist.cell=0.012");
+    works(at, "snow shot.toml -o fine -q --frames 1-4 --set mist.cell=0.016");
     // The cube fills everything where its grains rise.
     works(
         at,

@@ -8,7 +8,7 @@ use frazil::sweep::{self, Body, Settings};
 use frazil::vdb::{FloatGrid, level_set};
 use frazil::{Context, Pool};
 
-const CELL: f64 = 0.004;
+const CELL: f64 = 0.006;
 
 /// What a skin sweeps in a second, in a number of sub-steps.
 fn volume(skin: impl Motion + 'static, parts: u32) -> f64 {
