@@ -4,17 +4,9 @@ use std::fs;
 use std::path::Path;
 
 use frazil::geometry::mesh::attributes::{MeshArray, Number, On};
-use frazil::geometry::points::{Column, Points, Values};
-use frazil::geometry::{DVec3, DetailedMesh, Uvs};
-use frazil::io::{mesh, particles};
+use frazil::geometry::{DetailedMesh, Uvs};
+use frazil::io::mesh;
 use serde_json::Value;
-
-/// Writes particles at positions (m), numbered from `first_id` on.
-pub fn write_numbered(path: &Path, positions: &[DVec3], first_id: i64) {
-    let mut points = Points::at(1.0, positions).expect("points");
-    points.set("id", Values::Long(Column::Each((first_id..first_id + positions.len() as i64).collect())));
-    particles::write(path, &points, false).expect("a file");
-}
 
 pub fn array(name: &str, on: On, number: Number, values: Vec<f64>) -> MeshArray {
     MeshArray { name: name.into(), on, number, values }

@@ -2,13 +2,20 @@
 
 use std::path::Path;
 
+use frazil::geometry::points::{Column, Points, Values};
 use frazil::geometry::{DVec3, TriMesh};
-use frazil::io::mesh;
+use frazil::io::{mesh, particles};
 use frazil::surface::{Implicit, Isosurface, Params, Particles, SUPPORT, Tracker};
 use frazil::{Context, Pool};
 
-use super::followed::write_numbered;
 use super::shapes::sphere;
+
+/// Writes particles at positions (m), numbered from `first_id` on.
+pub fn write_numbered(path: &Path, positions: &[DVec3], first_id: i64) {
+    let mut points = Points::at(1.0, positions).expect("points");
+    points.set("id", Values::Long(Column::Each((first_id..first_id + positions.len() as i64).collect())));
+    particles::write(path, &points, false).expect("a file");
+}
 
 /// A context with threads of its own.
 pub fn context(threads: usize) -> Context {

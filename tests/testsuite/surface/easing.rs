@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use frazil::geometry::{DVec3, DetailedMesh, Vec3};
 
 use crate::common::character::{are_same, output};
-use crate::common::followed::{frame, values, write_numbered};
-use crate::common::liquids::ball;
+use crate::common::followed::{frame, values};
+use crate::common::liquids::{ball, write_numbered};
 use crate::program::{Folder, command, fails, kill_at, works};
 
 /// Initial distance between particles (m).

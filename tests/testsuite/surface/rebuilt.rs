@@ -12,8 +12,8 @@ use serde_json::json;
 
 use crate::common::character::{are_same, output};
 use crate::common::clients;
-use crate::common::followed::{array, frame, reported, values, write_mesh, write_numbered};
-use crate::common::liquids::ball;
+use crate::common::followed::{array, frame, reported, values, write_mesh};
+use crate::common::liquids::{ball, write_numbered};
 use crate::common::shapes::welded;
 use crate::common::usda::numbers;
 use crate::program::{Folder, kill_at, works};

@@ -8,8 +8,8 @@ use frazil::geometry::{DVec3, DetailedMesh, TriMesh, Vec3};
 use frazil::io::mesh;
 
 use crate::common::character::{are_same, output};
-use crate::common::followed::{array, counted, frame, report, seamed, values, write_mesh, write_numbered};
-use crate::common::liquids::{ball, write_cache};
+use crate::common::followed::{array, counted, frame, report, seamed, values, write_mesh};
+use crate::common::liquids::{ball, write_cache, write_numbered};
 use crate::program::{Folder, fails, kill_at, works};
 
 /// Distance between particles (m), and frames of the shot.

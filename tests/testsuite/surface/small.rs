@@ -7,8 +7,8 @@ use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::io::mesh;
 use frazil::surface::{Implicit, Isosurface};
 
-use crate::common::followed::{self, reported, write_numbered};
-use crate::common::liquids::context;
+use crate::common::followed::{self, reported};
+use crate::common::liquids::{context, write_numbered};
 use crate::program::{Folder, works};
 
 /// Distance between particles (m).

@@ -10,8 +10,8 @@ use frazil::io::mesh;
 use serde_json::json;
 
 use crate::common::clients;
-use crate::common::followed::{self, counted, write_mesh, write_numbered};
-use crate::common::liquids::ball;
+use crate::common::followed::{self, counted, write_mesh};
+use crate::common::liquids::{ball, write_numbered};
 use crate::common::usda::numbers;
 use crate::program::{Folder, works};
 
