@@ -53,7 +53,7 @@ impl<T: Copy + Default + Send + Sync> Lists<T> {
         &self.items[self.start[list] as usize..self.start[list + 1] as usize]
     }
 
-    /// Calls `change` with each list, in parallel.
+    /// Calls `change` with each list, in parallel on the threads of the caller's pool.
     pub fn each_mut(&mut self, change: impl Fn(&mut [T]) + Sync) {
         let mut rest = self.items.as_mut_slice();
         let mut groups = Vec::with_capacity(self.start.len() / GRAIN + 1);
@@ -63,14 +63,19 @@ impl<T: Copy + Default + Send + Sync> Lists<T> {
             groups.push((start, group));
             rest = after;
         }
-        groups.into_par_iter().for_each(|(start, group)| {
+        let change_group = |(start, group): (&[u32], &mut [T])| {
             for ends in start.windows(2).filter(|ends| ends[0] < ends[1]) {
                 change(&mut group[(ends[0] - start[0]) as usize..(ends[1] - start[0]) as usize]);
             }
-        });
+        };
+        if is_in_a_pool() {
+            groups.into_par_iter().for_each(change_group);
+        } else {
+            groups.into_iter().for_each(change_group);
+        }
     }
 
-    /// Makes a new list from each non-empty one, in parallel: `make` receives its index and items and appends the new ones.
+    /// Makes a new list from each non-empty one, in parallel as [`Lists::each_mut`]: `make` receives its index and items and appends the new ones.
     pub fn map<U: Copy + Send>(&self, make: impl Fn(usize, &[T], &mut Vec<U>) + Sync) -> Lists<U> {
         let part = |first: usize| {
             let last = (first + GRAIN).min(self.count());
@@ -84,9 +89,12 @@ impl<T: Copy + Default + Send + Sync> Lists<T> {
             }
             (ends, items)
         };
-        let groups = self.count().div_ceil(GRAIN);
-        let parts: Vec<(Vec<u32>, Vec<U>)> =
-            (0..groups).into_par_iter().map(|group| part(group * GRAIN)).collect();
+        let groups = 0..self.count().div_ceil(GRAIN);
+        let parts: Vec<(Vec<u32>, Vec<U>)> = if is_in_a_pool() {
+            groups.into_par_iter().map(|group| part(group * GRAIN)).collect()
+        } else {
+            groups.map(|group| part(group * GRAIN)).collect()
+        };
         let mut start = Vec::with_capacity(self.start.len());
         start.push(0);
         let mut items = Vec::with_capacity(parts.iter().map(|(_, items)| items.len()).sum());
@@ -97,6 +105,11 @@ impl<T: Copy + Default + Send + Sync> Lists<T> {
         }
         Lists { start, items }
     }
+}
+
+/// Whether this thread belongs to a pool. Elsewhere rayon would start a global pool, whose threads outlive the library's contexts.
+fn is_in_a_pool() -> bool {
+    rayon::current_thread_index().is_some()
 }
 
 #[cfg(test)]
