@@ -148,8 +148,8 @@ impl Tracker {
             covered.bare.iter_mut().zip(&self.bare).for_each(|(now, ever)| *now &= !ever);
             let is_flagged = |(kind, is_bare): (&Flag, &bool)| kind.foot().is_none() || *is_bare;
             next.flags = kinds.iter().zip(&covered.bare).map(is_flagged).collect();
-            let told = self.told(&kinds, &covered.bare, &paths);
-            next.report = StepReport { parts, triangles: surface.1.count(), ..told };
+            let counts = self.counts(&kinds, &covered.bare, &paths);
+            next.report = StepReport { parts, triangles: surface.1.count(), ..counts };
             let mut ahead = Ahead::default();
             if self.params.rebuild {
                 let change =
@@ -187,7 +187,7 @@ impl Tracker {
     }
 
     /// What a step reports of vertices and particles.
-    fn told(&self, kinds: &[Flag], bare: &[bool], paths: &Paths) -> StepReport {
+    fn counts(&self, kinds: &[Flag], bare: &[bool], paths: &Paths) -> StepReport {
         let count = |kind: Flag| kinds.iter().filter(|other| **other == kind).count();
         StepReport {
             jumped: count(Flag::Jumped),

@@ -328,9 +328,9 @@ pub unsafe extern "C" fn frz_context_set_poll(
         let began = call.0.began.clone();
         call.ctx().set_poll(poll.map(|poll| {
             let ask = move |progress: &Progress| {
-                let told = progress_of(progress, &began);
+                let reported = progress_of(progress, &began);
                 // SAFETY: the host guarantees a function that takes these.
-                unsafe { poll(user.pointer(), &told) != 0 }
+                unsafe { poll(user.pointer(), &reported) != 0 }
             };
             Box::new(ask) as crate::context::Poll
         }));
@@ -430,8 +430,8 @@ pub unsafe extern "C" fn frz_context_progress(
         let out = required(out, "out")?.cast::<u8>();
         out.write_bytes(0, FIRST_PROGRESS);
         let state = read(context)?;
-        let told = progress_of(&state.ctx.progress(), &state.began);
-        std::ptr::copy_nonoverlapping((&raw const told).cast::<u8>(), out, state.progress_room);
+        let progress = progress_of(&state.ctx.progress(), &state.began);
+        std::ptr::copy_nonoverlapping((&raw const progress).cast::<u8>(), out, state.progress_room);
         Ok(())
     })
 }

@@ -162,8 +162,8 @@ fn number(word: &[u8]) -> Option<f32> {
 
 /// A zero-based index from one that counts from 1, or backward from the last.
 fn index(word: &[u8], count: usize) -> Option<u32> {
-    let told: i64 = std::str::from_utf8(word).ok()?.parse().ok()?;
-    let index = if told < 0 { count as i64 + told } else { told - 1 };
+    let number: i64 = std::str::from_utf8(word).ok()?.parse().ok()?;
+    let index = if number < 0 { count as i64 + number } else { number - 1 };
     (0..count as i64).contains(&index).then_some(index as u32)
 }
 

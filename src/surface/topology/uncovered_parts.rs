@@ -162,12 +162,12 @@ impl Parts {
         }
         let cell = phi.cell();
         let sums = self.sums(phi, surface).into_iter().filter(|sum| sum.triangles > 0);
-        let told = sums.map(|Sum { corners, six, triangles, .. }| UncoveredPart {
+        let parts = sums.map(|Sum { corners, six, triangles, .. }| UncoveredPart {
             position: corners / (3 * triangles) as f64 * cell,
             volume: six / 6.0 * cell.powi(3),
             triangles,
         });
-        let mut out: Vec<UncoveredPart> = told.collect();
+        let mut out: Vec<UncoveredPart> = parts.collect();
         out.sort_by(|a, b| b.volume.abs().total_cmp(&a.volume.abs()));
         out
     }

@@ -56,7 +56,7 @@ pub struct State {
     /// The base layer after a frame.
     layer: Option<(i32, Grids)>,
     /// Whether it was logged that grains fell past the edge of the ground.
-    has_told: bool,
+    has_warned: bool,
 }
 
 /// Writes frames.
@@ -156,7 +156,7 @@ impl<'a> Grains<'a> {
         let time = |frame: i32| f64::from(frame) / self.scene.shot.fps;
         let step = state.grains.step(ctx, &around, [time(frame - 1), time(frame)], frame);
         let report = step.map_err(|error| error.in_file_at(&self.scene.path, "grains: "))?;
-        if report.fell > 0 && !std::mem::replace(&mut state.has_told, true) {
+        if report.fell > 0 && !std::mem::replace(&mut state.has_warned, true) {
             log::warn!(
                 "frame {frame}: {} grains fell past the edge of the ground to {BELOW} m below it and are dropped, as are all that follow \
                  them (`fell` in the reports): larger ground keeps them",
@@ -253,7 +253,7 @@ impl Stepping for Grains<'_> {
             Some(frame) => done.resume(frame, |bytes| grains::Grains::resume(params, bytes)),
         };
         let grains = grains.map_err(|error| error.in_file_at(&self.scene.path, "grains: "))?;
-        Ok(State { grains, layer: None, has_told: false })
+        Ok(State { grains, layer: None, has_warned: false })
     }
 
     fn step(&self, ctx: &Context, state: &mut State, to: &To<'_>) -> Result<Stepped<Self::Step>> {
