@@ -1074,7 +1074,7 @@ typedef struct frz_shallow frz_shallow;
  * Shallow liquid in cells of two sizes: those of its domain in a box that may move, around an instrument or a player, and cells of twice
  * the length everywhere else, where a frame takes a quarter of the time. No liquid is lost between them.
  *
- * It has no falls and no thickening. frz_shallow_detail_step, _surface, _save and _set_bodies work in real time, as frz_shallow defines
+ * It has no falls and no thickening. frz_shallow_detail_step, _surface, _save and _set_bodies are real-time calls, as frz_shallow defines
  * it; _set_near, _update_terrain and _update_heights may allocate, and so may _restore if it moves the box.
  */
 typedef struct frz_shallow_detail frz_shallow_detail;
@@ -4467,8 +4467,8 @@ frz_status frz_shallow_step(frz_context *context,
                             frz_shallow_report *report);
 
 /**
- * Computes a frame with given steps (a real-time call: see frz_shallow): from the same state, with the same parameters, flow points and bodies,
- * the result has the same bytes as the frame that the steps were reported for.
+ * Computes a frame with given steps (a real-time call: see frz_shallow): from the same state, with the same parameters, flow points and
+ * bodies, the result has the same bytes as the frame that the steps were reported for.
  *
  * steps: double for each step, its length (s), 1e-12 to 1e6, as frz_shallow_last_steps listed them: 1 to 1000000 steps, together up to 1e6
  *     s.
@@ -4565,8 +4565,8 @@ frz_status frz_shallow_set_depths(frz_shallow *shallow,
 frz_status frz_shallow_get_balance(const frz_shallow *shallow, frz_shallow_balance *balance);
 
 /**
- * Moves the vertices of the mesh that the liquid was created with (a real-time call: see frz_shallow): bones and organs move or deform. The liquid
- * is carried along, and none of it is lost; flow points on triangles move with them. After a failure all is as it was.
+ * Moves the vertices of the mesh that the liquid was created with (a real-time call: see frz_shallow): bones and organs move or deform.
+ * The liquid is carried along, and none of it is lost; flow points on triangles move with them. After a failure all is as it was.
  *
  * positions: float[3] for each vertex (m), finite, in the mesh's order.
  * bounds: double[4], minimum x, minimum z, maximum x and maximum z (m) of all triangles that move, at their old and their new positions:
@@ -4582,8 +4582,8 @@ frz_status frz_shallow_update_terrain(frz_context *context,
                                       frz_shallow_moved *moved);
 
 /**
- * Changes the heights of the height field that the liquid was created with (a real-time call: see frz_shallow). The liquid is carried along, and
- * none of it is lost. After a failure all is as it was.
+ * Changes the heights of the height field that the liquid was created with (a real-time call: see frz_shallow). The liquid is carried
+ * along, and none of it is lost. After a failure all is as it was.
  *
  * heights: float for each cell of the domain (m), finite, as in frz_shallow_create_heights.
  * bounds: as in frz_shallow_update_terrain: heights outside it are assumed unchanged.
@@ -4598,8 +4598,8 @@ frz_status frz_shallow_update_heights(frz_context *context,
                                       frz_shallow_moved *moved);
 
 /**
- * Sets the solids that move over the ground, replacing those before (a real-time call: see frz_shallow): the ground is rebuilt where one moves,
- * and no triangle is visited. The liquid is displaced, and none of it is lost. After a failure all is as it was.
+ * Sets the solids that move over the ground, replacing those before (a real-time call: see frz_shallow): the ground is rebuilt where one
+ * moves, and no triangle is visited. The liquid is displaced, and none of it is lost. After a failure all is as it was.
  *
  * A body is identified by its index: keep it at the same one from call to call. Bodies that do not move cost nothing.
  *
@@ -4649,8 +4649,8 @@ frz_status frz_shallow_lend(const frz_shallow *shallow,
                             frz_view *out);
 
 /**
- * Reads the liquid at points (a real-time call: see frz_shallow): from the column that contains a point, or else the nearest one above or below
- * it.
+ * Reads the liquid at points (a real-time call: see frz_shallow): from the column that contains a point, or else the nearest one above or
+ * below it.
  *
  * points: double[3] for each (m).
  * dst: room for a frz_shallow_sample for each; FRZ_ERROR_CAPACITY if it is too small, and nothing is written.
@@ -4678,8 +4678,8 @@ frz_status frz_shallow_volume(const frz_shallow *shallow,
                               double *volume);
 
 /**
- * Saves all that the next frame depends on besides the ground, the parameters, the flow points and the bodies (a real-time call: see frz_shallow):
- * for a replay, an undo, a host's own cache. The bytes are the same on any number of threads.
+ * Saves all that the next frame depends on besides the ground, the parameters, the flow points and the bodies (a real-time call: see
+ * frz_shallow): for a replay, an undo, a host's own cache. The bytes are the same on any number of threads.
  *
  * dst: room for capacity bytes. NULL: only the current size is reported; it grows with the wet area of the ground.
  * capacity: size of dst (bytes). FRZ_ERROR_CAPACITY if it is too small.
@@ -4694,8 +4694,8 @@ frz_status frz_shallow_save(frz_context *context,
                             size_t *size);
 
 /**
- * Replaces the liquid's state by a saved one (a real-time call: see frz_shallow): from there it flows as the saved one did, to the same bytes,
- * with the same parameters, flow points and bodies, which must be set before. The volumes moved by flow points are restored too.
+ * Replaces the liquid's state by a saved one (a real-time call: see frz_shallow): from there it flows as the saved one did, to the same
+ * bytes, with the same parameters, flow points and bodies, which must be set before. The volumes moved by flow points are restored too.
  *
  * state: bytes bytes of frz_shallow_save. FRZ_ERROR_FILE, with the liquid unchanged, if they are damaged, or of another version, another
  *     ground or border, or other kinds of flow points.
@@ -4731,9 +4731,9 @@ frz_status frz_shallow_surface_bound(const frz_shallow *shallow,
                                      frz_shallow_size *size);
 
 /**
- * Writes the liquid's surface as triangles (a real-time call: see frz_shallow): the wet columns and the dry ones around them. It ends at the
- * centres of the outermost cells. Vertices are in the order of their columns' indices, followed by those next to walls, and last those on
- * the ground's edges.
+ * Writes the liquid's surface as triangles (a real-time call: see frz_shallow): the wet columns and the dry ones around them. It ends at
+ * the centres of the outermost cells. Vertices are in the order of their columns' indices, followed by those next to walls, and last those
+ * on the ground's edges.
  *
  * layout: NULL for the defaults.
  * target: the buffers. FRZ_ERROR_CAPACITY if one is too small: nothing is written, and size receives what is needed. With all data NULL
@@ -4751,7 +4751,7 @@ frz_status frz_shallow_surface(frz_context *context,
 /**
  * Finds the ledges, where the ground ends over nothing, as at the edges of shelves and of holes, for surfaces with FRZ_SHALLOW_SKIRTED.
  * With the mesh that the liquid was created with, the edge is located between the centres of cells; on other ground the surface extends by
- * half a cell. In real time (frz_shallow): it visits all triangles once. Call it again after frz_shallow_update_terrain or
+ * half a cell. A real-time call (see frz_shallow): it visits all triangles once. Call it again after frz_shallow_update_terrain or
  * frz_shallow_set_bodies have moved something, before the next such surface.
  *
  * size: receives the maximum that this adds to frz_shallow_surface_bound, all zeroes after a failure; may be NULL. Its struct_size is set
@@ -4764,9 +4764,9 @@ frz_status frz_shallow_find_ledges(frz_context *context,
                                    frz_shallow_size *size);
 
 /**
- * Finds the minimum heights of all columns, or of those that have changed, from the mesh that the liquid was created with, in real time
- * (frz_shallow), for surfaces with FRZ_SHALLOW_LIFTED. They change what is shown, not the flow. It visits all triangles once. Call it
- * again after frz_shallow_update_terrain or frz_shallow_set_bodies have moved something, before the next such surface.
+ * Finds the minimum heights of all columns, or of those that have changed, from the mesh that the liquid was created with, for surfaces
+ * with FRZ_SHALLOW_LIFTED (a real-time call: see frz_shallow). They change what is shown, not the flow. It visits all triangles once. Call
+ * it again after frz_shallow_update_terrain or frz_shallow_set_bodies have moved something, before the next such surface.
  *
  * distance: NULL for the defaults. If it differs from the one before, all columns must be found.
  * bounds: double[4], minimum x, minimum z, maximum x and maximum z (m) of all triangles and bodies that have moved since the last call, at
@@ -4876,8 +4876,8 @@ frz_status frz_shallow_snapshot_drops(const frz_shallow_snapshot *snapshot,
 frz_status frz_shallow_drops_bound(const frz_shallow *shallow, frz_shallow_size *size);
 
 /**
- * Writes the liquid in the air as triangles (a real-time call: see frz_shallow): a sphere for each drop, and strands between consecutive drops
- * from one edge. The spheres' vertices come first, in the order of their drops.
+ * Writes the liquid in the air as triangles (a real-time call: see frz_shallow): a sphere for each drop, and strands between consecutive
+ * drops from one edge. The spheres' vertices come first, in the order of their drops.
  *
  * layout: NULL for the defaults; its depths and FRZ_SHALLOW_LIFTED are ignored.
  * target: the buffers. FRZ_ERROR_CAPACITY if one is too small: nothing is written, and size receives what is needed. With all data NULL
@@ -4909,9 +4909,9 @@ frz_status frz_shallow_snapshot_drops_mesh(frz_context *context,
                                            frz_shallow_size *size);
 
 /**
- * Reports the current load of the liquid on each body of frz_shallow_set_bodies (a real-time call: see frz_shallow): the weight that buoys or
- * pushes it, the drag of the flow over it and of its own motion, and how much of it is submerged. The liquid below a body is that found by
- * the last step: make a step after frz_shallow_set_bodies first.
+ * Reports the current load of the liquid on each body of frz_shallow_set_bodies (a real-time call: see frz_shallow): the weight that buoys
+ * or pushes it, the drag of the flow over it and of its own motion, and how much of it is submerged. The liquid below a body is that found
+ * by the last step: make a step after frz_shallow_set_bodies first.
  *
  * density: of the liquid (kg/m3), over 0, finite: blood 1060, water 1000.
  * velocities: double[3] for each body (m/s), finite, in their order; data NULL with a count of 0: none of them moves.
@@ -4955,8 +4955,8 @@ frz_status frz_shallow_stains_create(frz_context *context,
                                      frz_shallow_stains **out);
 
 /**
- * Lets the liquid stain the ground, and the ground absorb liquid, for the time since the last call: once a frame, in real time
- * (frz_shallow).
+ * Lets the liquid stain the ground, and the ground absorb liquid, for the time since the last call, once a frame (a real-time call: see
+ * frz_shallow).
  *
  * shallow: the liquid, after its frame; only ground with a capacity changes it. What it absorbs is part of frz_shallow_balance.absorbed.
  * positions: float[3] for each vertex (m), finite: the current ones. After a failure all is as it was.
@@ -4980,7 +4980,8 @@ frz_status frz_shallow_stains_update(frz_context *context,
 frz_status frz_shallow_stains_read(const frz_shallow_stains *stains, frz_span dst);
 
 /**
- * Copies how soaked each vertex is, as a fraction of its capacity, 0 to 1 (a real-time call: see frz_shallow); 0 where the ground does not absorb.
+ * Copies how soaked each vertex is, as a fraction of its capacity, 0 to 1 (a real-time call: see frz_shallow); 0 where the ground does not
+ * absorb.
  *
  * dst: as in frz_shallow_stains_read.
  *
@@ -5171,7 +5172,7 @@ frz_status frz_shallow_detail_set_near(frz_shallow_detail *detail,
 frz_status frz_shallow_detail_get_near(const frz_shallow_detail *detail, double *near);
 
 /**
- * Computes a frame, in real time (frz_shallow_detail), as frz_shallow_step does without a budget.
+ * Computes a frame (a real-time call: see frz_shallow_detail), as frz_shallow_step does without a budget.
  *
  * dt: as in frz_shallow_step.
  * report: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
@@ -5280,8 +5281,8 @@ frz_status frz_shallow_detail_update_heights(frz_context *context,
                                              frz_shallow_moved *moved);
 
 /**
- * Sets the solids that move over the ground, as frz_shallow_set_bodies does, in real time (frz_shallow_detail). They may cross the edge of
- * the box. After a failure all is as it was.
+ * Sets the solids that move over the ground, as frz_shallow_set_bodies does (a real-time call: see frz_shallow_detail). They may cross the
+ * edge of the box. After a failure all is as it was.
  *
  * bodies: count bodies; NULL with a count of 0: none.
  * count: number of bodies.
@@ -5307,8 +5308,8 @@ frz_status frz_shallow_detail_surface_bound(const frz_shallow_detail *detail,
                                             frz_shallow_size *size);
 
 /**
- * Writes the surface of all liquid as triangles, in real time (frz_shallow_detail): one mesh, without a crack between small and large
- * cells. It ends at the centres of the outermost cells. The first call after the box of small cells has moved may allocate.
+ * Writes the surface of all liquid as triangles (a real-time call: see frz_shallow_detail): one mesh, without a crack between small and
+ * large cells. It ends at the centres of the outermost cells. The first call after the box of small cells has moved may allocate.
  *
  * layout: NULL for the defaults. Without FRZ_SHALLOW_LIFTED and FRZ_SHALLOW_SKIRTED.
  * target: the buffers, as in frz_shallow_surface. In frz_shallow_target.columns the indices of large cells follow those of small ones.
@@ -5324,8 +5325,8 @@ frz_status frz_shallow_detail_surface(frz_context *context,
                                       frz_shallow_size *size);
 
 /**
- * Saves all that the next frame depends on, as frz_shallow_save does, in real time (frz_shallow_detail). The box of small cells is part of
- * it.
+ * Saves all that the next frame depends on, as frz_shallow_save does (a real-time call: see frz_shallow_detail). The box of small cells is
+ * part of it.
  *
  * dst: room for capacity bytes. NULL: only the current size is reported.
  * capacity: size of dst (bytes). FRZ_ERROR_CAPACITY if it is too small.

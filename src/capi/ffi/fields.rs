@@ -1,7 +1,7 @@
 //! Structs of the interface that repeat a struct of the library.
 
-/// Makes a struct of the interface from the library's own: the named fields, as the numbers that the interface has; all others are 0.
-/// With `<=>` also the other way: `over` replaces these fields of the library's own struct.
+/// Converts a struct of the library to one of the interface: copies the named fields, cast to the interface's types; all others are 0. With
+/// `<=>` also the other way: `over` replaces these fields of the library's own struct.
 macro_rules! fields_of {
     ($own:ident <=> $host:ident { $($field:ident),+ }) => {
         fields_of!($own => $host { $($field),+ });

@@ -60,11 +60,11 @@ pub(in crate::capi) unsafe fn give<N: HandleType>(out: *mut *mut N, value: N::Va
 /// Zeroes an output of a call unless it is NULL: outputs are 0 after every failure.
 ///
 /// # Safety
-/// `out` must be NULL or point to memory for a number or pointer.
+/// `out` must be NULL or point to memory, aligned or not, for a value for which zero bytes are valid.
 pub(in crate::capi) unsafe fn clear<T>(out: *mut T) {
     if !out.is_null() {
-        // SAFETY: guaranteed by the caller; all-zero bytes are 0 and NULL.
-        unsafe { out.write_bytes(0, 1) };
+        // SAFETY: guaranteed by the caller; bytes need no alignment.
+        unsafe { out.cast::<u8>().write_bytes(0, size_of::<T>()) };
     }
 }
 
@@ -79,7 +79,7 @@ pub(in crate::capi) unsafe fn write_some<T>(out: *mut T, value: T) {
     }
 }
 
-/// Runs the work of a call whose result is a number, or an array of them, which `out` receives; zeroes after a failure.
+/// Runs the work of a call that returns a value, which `out` receives; zeroes after a failure.
 ///
 /// # Safety
 /// `out` must be NULL or point to memory for it.

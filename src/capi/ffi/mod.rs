@@ -1,5 +1,4 @@
-//! The C boundary itself: statuses, handles, views of a host's memory, saved states. What every file of the interface needs is passed on
-//! from here.
+//! The C boundary itself: statuses, handles, views of a host's memory, saved states. Re-exports what every file of the interface needs.
 
 // In the order of the header.
 pub(in crate::capi) mod guard;

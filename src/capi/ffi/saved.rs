@@ -56,8 +56,8 @@ impl Saved {
     }
 }
 
-/// An interface function that writes an object's state to the host, or reports its size, as [`write_bytes`] does. `parts` are where the
-/// state may have been kept, and what `save` makes it of otherwise.
+/// An interface function that writes an object's state to the host, or reports its size, as [`write_bytes`] does. `parts` returns where a
+/// queried state is kept, and the object that `save` otherwise saves.
 ///
 /// # Safety
 /// The pointers must be NULL or valid.

@@ -302,7 +302,7 @@ pub(in crate::capi) unsafe trait Sized32: Copy {
         unsafe { std::mem::zeroed() }
     }
 
-    /// What fields are that a host does not set.
+    /// The values of fields that a host does not set.
     fn defaults() -> Self {
         Self::zeroed()
     }

@@ -175,8 +175,8 @@ pub unsafe extern "C" fn frz_shallow_drops_bound(
     }
 }
 
-/// Writes the liquid in the air as triangles (a real-time call: see frz_shallow): a sphere for each drop, and strands between consecutive drops
-/// from one edge. The spheres' vertices come first, in the order of their drops.
+/// Writes the liquid in the air as triangles (a real-time call: see frz_shallow): a sphere for each drop, and strands between consecutive
+/// drops from one edge. The spheres' vertices come first, in the order of their drops.
 ///
 /// layout: NULL for the defaults; its depths and FRZ_SHALLOW_LIFTED are ignored.
 /// target: the buffers. FRZ_ERROR_CAPACITY if one is too small: nothing is written, and size receives what is needed. With all data NULL

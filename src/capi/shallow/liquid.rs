@@ -186,8 +186,8 @@ pub unsafe extern "C" fn frz_shallow_step(
     }
 }
 
-/// Computes a frame with given steps (a real-time call: see frz_shallow): from the same state, with the same parameters, flow points and bodies,
-/// the result has the same bytes as the frame that the steps were reported for.
+/// Computes a frame with given steps (a real-time call: see frz_shallow): from the same state, with the same parameters, flow points and
+/// bodies, the result has the same bytes as the frame that the steps were reported for.
 ///
 /// steps: double for each step, its length (s), 1e-12 to 1e6, as frz_shallow_last_steps listed them: 1 to 1000000 steps, together up to 1e6
 ///     s.

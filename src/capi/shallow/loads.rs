@@ -45,9 +45,9 @@ unsafe fn put(dst: *mut frz_shallow_load, loads: impl ExactSizeIterator<Item = L
     Ok(())
 }
 
-/// Reports the current load of the liquid on each body of frz_shallow_set_bodies (a real-time call: see frz_shallow): the weight that buoys or
-/// pushes it, the drag of the flow over it and of its own motion, and how much of it is submerged. The liquid below a body is that found by
-/// the last step: make a step after frz_shallow_set_bodies first.
+/// Reports the current load of the liquid on each body of frz_shallow_set_bodies (a real-time call: see frz_shallow): the weight that buoys
+/// or pushes it, the drag of the flow over it and of its own motion, and how much of it is submerged. The liquid below a body is that found
+/// by the last step: make a step after frz_shallow_set_bodies first.
 ///
 /// density: of the liquid (kg/m3), over 0, finite: blood 1060, water 1000.
 /// velocities: double[3] for each body (m/s), finite, in their order; data NULL with a count of 0: none of them moves.

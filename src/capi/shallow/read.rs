@@ -251,8 +251,8 @@ pub struct frz_shallow_sample {
 // SAFETY: numbers, without padding.
 unsafe impl Plain for frz_shallow_sample {}
 
-/// Reads the liquid at points (a real-time call: see frz_shallow): from the column that contains a point, or else the nearest one above or below
-/// it.
+/// Reads the liquid at points (a real-time call: see frz_shallow): from the column that contains a point, or else the nearest one above or
+/// below it.
 ///
 /// points: double[3] for each (m).
 /// dst: room for a frz_shallow_sample for each; FRZ_ERROR_CAPACITY if it is too small, and nothing is written.

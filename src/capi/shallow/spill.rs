@@ -81,6 +81,7 @@ impl ShallowHandle {
             steps: Vec::with_capacity(1024),
         })
     }
+
     /// After a change of the ground: minimum heights and ledges must be found again where it has moved.
     pub fn after(&mut self, moved: Moved) -> Moved {
         if moved.cells > 0 {

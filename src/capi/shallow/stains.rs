@@ -134,8 +134,8 @@ pub unsafe extern "C" fn frz_shallow_stains_create(
 /// Memory (bytes) of a vertex: its stain, when it was wet, its content and capacity, and its position, twice while it is read.
 const BYTES: u64 = 52;
 
-/// Lets the liquid stain the ground, and the ground absorb liquid, for the time since the last call: once a frame, in real time
-/// (frz_shallow).
+/// Lets the liquid stain the ground, and the ground absorb liquid, for the time since the last call, once a frame (a real-time call: see
+/// frz_shallow).
 ///
 /// shallow: the liquid, after its frame; only ground with a capacity changes it. What it absorbs is part of frz_shallow_balance.absorbed.
 /// positions: float[3] for each vertex (m), finite: the current ones. After a failure all is as it was.
@@ -180,7 +180,8 @@ pub unsafe extern "C" fn frz_shallow_stains_read(
     guard(|| unsafe { dst.put("dst", read(stains)?.stains.each()) })
 }
 
-/// Copies how soaked each vertex is, as a fraction of its capacity, 0 to 1 (a real-time call: see frz_shallow); 0 where the ground does not absorb.
+/// Copies how soaked each vertex is, as a fraction of its capacity, 0 to 1 (a real-time call: see frz_shallow); 0 where the ground does not
+/// absorb.
 ///
 /// dst: as in frz_shallow_stains_read.
 ///

@@ -7,8 +7,8 @@ use crate::capi::ffi::saved::{restores, saves_in_place};
 use crate::capi::ffi::*;
 use crate::capi::runtime::context::frz_context;
 
-/// Saves all that the next frame depends on besides the ground, the parameters, the flow points and the bodies (a real-time call: see frz_shallow):
-/// for a replay, an undo, a host's own cache. The bytes are the same on any number of threads.
+/// Saves all that the next frame depends on besides the ground, the parameters, the flow points and the bodies (a real-time call: see
+/// frz_shallow): for a replay, an undo, a host's own cache. The bytes are the same on any number of threads.
 ///
 /// dst: room for capacity bytes. NULL: only the current size is reported; it grows with the wet area of the ground.
 /// capacity: size of dst (bytes). FRZ_ERROR_CAPACITY if it is too small.
@@ -35,8 +35,8 @@ pub unsafe extern "C" fn frz_shallow_save(
     }
 }
 
-/// Replaces the liquid's state by a saved one (a real-time call: see frz_shallow): from there it flows as the saved one did, to the same bytes,
-/// with the same parameters, flow points and bodies, which must be set before. The volumes moved by flow points are restored too.
+/// Replaces the liquid's state by a saved one (a real-time call: see frz_shallow): from there it flows as the saved one did, to the same
+/// bytes, with the same parameters, flow points and bodies, which must be set before. The volumes moved by flow points are restored too.
 ///
 /// state: bytes bytes of frz_shallow_save. FRZ_ERROR_FILE, with the liquid unchanged, if they are damaged, or of another version, another
 ///     ground or border, or other kinds of flow points.

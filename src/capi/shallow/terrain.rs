@@ -35,8 +35,8 @@ unsafe impl Sized32 for frz_shallow_moved {
 
 fields_of!(Moved => frz_shallow_moved { cells, displaced, held, fallen });
 
-/// Moves the vertices of the mesh that the liquid was created with (a real-time call: see frz_shallow): bones and organs move or deform. The liquid
-/// is carried along, and none of it is lost; flow points on triangles move with them. After a failure all is as it was.
+/// Moves the vertices of the mesh that the liquid was created with (a real-time call: see frz_shallow): bones and organs move or deform.
+/// The liquid is carried along, and none of it is lost; flow points on triangles move with them. After a failure all is as it was.
 ///
 /// positions: float[3] for each vertex (m), finite, in the mesh's order.
 /// bounds: double[4], minimum x, minimum z, maximum x and maximum z (m) of all triangles that move, at their old and their new positions:
@@ -68,8 +68,8 @@ pub unsafe extern "C" fn frz_shallow_update_terrain(
     }
 }
 
-/// Changes the heights of the height field that the liquid was created with (a real-time call: see frz_shallow). The liquid is carried along, and
-/// none of it is lost. After a failure all is as it was.
+/// Changes the heights of the height field that the liquid was created with (a real-time call: see frz_shallow). The liquid is carried
+/// along, and none of it is lost. After a failure all is as it was.
 ///
 /// heights: float for each cell of the domain (m), finite, as in frz_shallow_create_heights.
 /// bounds: as in frz_shallow_update_terrain: heights outside it are assumed unchanged.
@@ -159,8 +159,8 @@ impl frz_shallow_body {
     }
 }
 
-/// Sets the solids that move over the ground, replacing those before (a real-time call: see frz_shallow): the ground is rebuilt where one moves,
-/// and no triangle is visited. The liquid is displaced, and none of it is lost. After a failure all is as it was.
+/// Sets the solids that move over the ground, replacing those before (a real-time call: see frz_shallow): the ground is rebuilt where one
+/// moves, and no triangle is visited. The liquid is displaced, and none of it is lost. After a failure all is as it was.
 ///
 /// A body is identified by its index: keep it at the same one from call to call. Bodies that do not move cost nothing.
 ///

@@ -73,8 +73,8 @@ pub unsafe extern "C" fn frz_shallow_detail_update_heights(
     }
 }
 
-/// Sets the solids that move over the ground, as frz_shallow_set_bodies does, in real time (frz_shallow_detail). They may cross the edge of
-/// the box. After a failure all is as it was.
+/// Sets the solids that move over the ground, as frz_shallow_set_bodies does (a real-time call: see frz_shallow_detail). They may cross the
+/// edge of the box. After a failure all is as it was.
 ///
 /// bodies: count bodies; NULL with a count of 0: none.
 /// count: number of bodies.
@@ -114,8 +114,8 @@ pub unsafe extern "C" fn frz_shallow_detail_surface_bound(
     unsafe { informs(size, || Ok(bound(&read(detail)?.detail))) }
 }
 
-/// Writes the surface of all liquid as triangles, in real time (frz_shallow_detail): one mesh, without a crack between small and large
-/// cells. It ends at the centres of the outermost cells. The first call after the box of small cells has moved may allocate.
+/// Writes the surface of all liquid as triangles (a real-time call: see frz_shallow_detail): one mesh, without a crack between small and
+/// large cells. It ends at the centres of the outermost cells. The first call after the box of small cells has moved may allocate.
 ///
 /// layout: NULL for the defaults. Without FRZ_SHALLOW_LIFTED and FRZ_SHALLOW_SKIRTED.
 /// target: the buffers, as in frz_shallow_surface. In frz_shallow_target.columns the indices of large cells follow those of small ones.
@@ -154,8 +154,8 @@ pub unsafe extern "C" fn frz_shallow_detail_surface(
     }
 }
 
-/// Saves all that the next frame depends on, as frz_shallow_save does, in real time (frz_shallow_detail). The box of small cells is part of
-/// it.
+/// Saves all that the next frame depends on, as frz_shallow_save does (a real-time call: see frz_shallow_detail). The box of small cells is
+/// part of it.
 ///
 /// dst: room for capacity bytes. NULL: only the current size is reported.
 /// capacity: size of dst (bytes). FRZ_ERROR_CAPACITY if it is too small.

@@ -19,7 +19,7 @@ use crate::shallow::two_level::surface::Surface;
 /// Shallow liquid in cells of two sizes: those of its domain in a box that may move, around an instrument or a player, and cells of twice
 /// the length everywhere else, where a frame takes a quarter of the time. No liquid is lost between them.
 ///
-/// It has no falls and no thickening. frz_shallow_detail_step, _surface, _save and _set_bodies work in real time, as frz_shallow defines
+/// It has no falls and no thickening. frz_shallow_detail_step, _surface, _save and _set_bodies are real-time calls, as frz_shallow defines
 /// it; _set_near, _update_terrain and _update_heights may allocate, and so may _restore if it moves the box.
 pub struct frz_shallow_detail {
     _opaque: [u8; 0],
@@ -180,7 +180,7 @@ pub unsafe extern "C" fn frz_shallow_detail_get_near(
     })
 }
 
-/// Computes a frame, in real time (frz_shallow_detail), as frz_shallow_step does without a budget.
+/// Computes a frame (a real-time call: see frz_shallow_detail), as frz_shallow_step does without a budget.
 ///
 /// dt: as in frz_shallow_step.
 /// report: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.

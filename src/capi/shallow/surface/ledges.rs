@@ -10,7 +10,7 @@ use crate::capi::shallow::spill::{ShallowHandle, frz_shallow};
 
 /// Finds the ledges, where the ground ends over nothing, as at the edges of shelves and of holes, for surfaces with FRZ_SHALLOW_SKIRTED.
 /// With the mesh that the liquid was created with, the edge is located between the centres of cells; on other ground the surface extends by
-/// half a cell. In real time (frz_shallow): it visits all triangles once. Call it again after frz_shallow_update_terrain or
+/// half a cell. A real-time call (see frz_shallow): it visits all triangles once. Call it again after frz_shallow_update_terrain or
 /// frz_shallow_set_bodies have moved something, before the next such surface.
 ///
 /// size: receives the maximum that this adds to frz_shallow_surface_bound, all zeroes after a failure; may be NULL. Its struct_size is set

@@ -58,9 +58,9 @@ unsafe impl Sized32 for frz_shallow_fitted {
 
 fields_of!(Fitted => frz_shallow_fitted { upward, discarded, capped });
 
-/// Finds the minimum heights of all columns, or of those that have changed, from the mesh that the liquid was created with, in real time
-/// (frz_shallow), for surfaces with FRZ_SHALLOW_LIFTED. They change what is shown, not the flow. It visits all triangles once. Call it
-/// again after frz_shallow_update_terrain or frz_shallow_set_bodies have moved something, before the next such surface.
+/// Finds the minimum heights of all columns, or of those that have changed, from the mesh that the liquid was created with, for surfaces
+/// with FRZ_SHALLOW_LIFTED (a real-time call: see frz_shallow). They change what is shown, not the flow. It visits all triangles once. Call
+/// it again after frz_shallow_update_terrain or frz_shallow_set_bodies have moved something, before the next such surface.
 ///
 /// distance: NULL for the defaults. If it differs from the one before, all columns must be found.
 /// bounds: double[4], minimum x, minimum z, maximum x and maximum z (m) of all triangles and bodies that have moved since the last call, at

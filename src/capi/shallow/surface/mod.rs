@@ -384,9 +384,9 @@ pub unsafe extern "C" fn frz_shallow_surface_bound(
     unsafe { informs(size, || Ok(bound(read(shallow)?.shallow.columns()))) }
 }
 
-/// Writes the liquid's surface as triangles (a real-time call: see frz_shallow): the wet columns and the dry ones around them. It ends at the
-/// centres of the outermost cells. Vertices are in the order of their columns' indices, followed by those next to walls, and last those on
-/// the ground's edges.
+/// Writes the liquid's surface as triangles (a real-time call: see frz_shallow): the wet columns and the dry ones around them. It ends at
+/// the centres of the outermost cells. Vertices are in the order of their columns' indices, followed by those next to walls, and last those
+/// on the ground's edges.
 ///
 /// layout: NULL for the defaults.
 /// target: the buffers. FRZ_ERROR_CAPACITY if one is too small: nothing is written, and size receives what is needed. With all data NULL
