@@ -98,6 +98,7 @@ install-core: setup-core
 hosts: setup
 	$(BUILD)
 	./tools/install "$(CURDIR)/target/install"
+	@grep -qsxF 'CMAKE_HOME_DIRECTORY:INTERNAL=$(CURDIR)/tests/ctest/full' target/ctest/CMakeCache.txt || rm -rf target/ctest
 	cmake -S tests/ctest/full -B target/ctest -DCMAKE_PREFIX_PATH="$(CURDIR)/target/install" >/dev/null
 	cmake --build target/ctest --parallel $(shell nproc) >/dev/null
 
@@ -112,6 +113,7 @@ hosts-core: setup
 	$(CORE)
 	rm -rf target/core/install
 	./tools/install-core "$(CURDIR)/target/core/install"
+	@grep -qsxF 'CMAKE_HOME_DIRECTORY:INTERNAL=$(CURDIR)/tests/ctest/core' target/core/ctest/CMakeCache.txt || rm -rf target/core/ctest
 	cmake -S tests/ctest/core -B target/core/ctest -DCMAKE_PREFIX_PATH="$(CURDIR)/target/core/install" >/dev/null
 	cmake --build target/core/ctest --parallel $(shell nproc) >/dev/null
 

@@ -7,18 +7,18 @@ pub fn cell_of(position: &DVec3) -> Coord {
     [0, 1, 2].map(|axis| position[axis].floor() as i32)
 }
 
-/// The sum of two.
+/// The sum of two coordinates.
 pub fn plus(a: Coord, b: Coord) -> Coord {
     [0, 1, 2].map(|axis| a[axis] + b[axis])
 }
 
-/// All from one to another, including both, ascending.
+/// All coordinates of the box from `low` to `high`, including both, ascending.
 pub fn between(low: Coord, high: Coord) -> impl Iterator<Item = Coord> {
     let on = move |axis: usize| low[axis]..=high[axis];
     on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z])))
 }
 
-/// Whether one is in the box from one to another, including both.
+/// Whether a coordinate is in the box from `low` to `high`, including both.
 pub fn is_between(at: Coord, low: Coord, high: Coord) -> bool {
     (0..3).all(|axis| (low[axis]..=high[axis]).contains(&at[axis]))
 }

@@ -15,7 +15,7 @@ pub fn normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
     (b - a).cross(&(c - a))
 }
 
-/// Six times the volume of the tetrahedron between a triangle and a position; positive if that is behind the triangle.
+/// Six times the volume of the tetrahedron between a triangle and a position; positive if the position is behind the triangle.
 pub fn six_volumes(corners: &[DVec3; 3], from: &DVec3) -> f64 {
     let [a, b, c] = corners.map(|corner| corner - from);
     a.dot(&b.cross(&c))

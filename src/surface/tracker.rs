@@ -200,7 +200,7 @@ impl Tracker {
         }
     }
 
-    /// Takes over the mesh after a step.
+    /// Takes over the mesh after a step; returns its report.
     fn adopt(&mut self, next: Next) -> StepReport {
         (self.vertices, self.delta, self.flags) = (next.vertices, next.delta, next.flags);
         self.drift.vertices = next.drifts;

@@ -63,7 +63,9 @@ class Structs(unittest.TestCase):
             places[f"sizeof({struct})"] = _library.c.sizeof(kind)
             for field in re.findall(r"(\w+)(?:\[\w+\])*;", fields):
                 places[f"offsetof({struct}, {field})"] = getattr(kind, field).offset
-        self.assertGreater(len(places), 250)
+        structs = {place[len("sizeof("):-1] for place in places if place.startswith("sizeof(")}
+        self.assertEqual(structs, set(_library.STRUCTS))
+        self.assertGreater(len(places), 400)
         # The compiler compares them: of the first one that differs it says the name.
         lines = [f'_Static_assert({place} == {value}, "{place}");' for place, value in places.items()]
         with tempfile.TemporaryDirectory() as folder:

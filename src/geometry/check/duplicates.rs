@@ -53,7 +53,7 @@ pub fn rotated<T: Ord + Copy>([a, b, c]: [T; 3]) -> [T; 3] {
     [a, b, c].min([b, c, a]).min([c, a, b])
 }
 
-/// Triangles sorted by their vertices, these ascending: each with its index, and whether it has them in one or the other orientation.
+/// Triangles sorted by their vertices, these ascending: each with its index and its orientation, true if they ascend in its own order too.
 pub fn by_vertices(triangles: &[[u32; 3]]) -> Vec<([u32; 3], u32, bool)> {
     let sorted = |(triangle, number): (&[u32; 3], u32)| {
         let [a, b, c] = rotated(*triangle);

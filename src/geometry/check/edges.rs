@@ -13,7 +13,7 @@ const SMALLEST: u32 = 4;
 
 /// The edges of triangles over `vertices` vertices, sorted, each with all triangles that have it.
 pub fn edge_uses(vertices: usize, triangles: &[[u32; 3]]) -> Vec<Use> {
-    // By the smaller vertex, then by comparisons: few edges begin at one vertex.
+    // Sorted by the smaller vertex by counting, then by comparisons: few edges begin at one vertex.
     let of_triangle = |(triangle, number)| sides(triangle).map(|ends| (ends[0], (ends, number)));
     let mut uses = Lists::new(vertices, triangles.iter().zip(0..).flat_map(of_triangle));
     uses.each_mut(|uses| uses.sort_unstable());

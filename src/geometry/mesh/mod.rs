@@ -96,17 +96,26 @@ impl TriMesh {
     }
 
     /// Whether every edge is used as often in one direction as in the other.
+    ///
+    /// # Panics
+    /// An index out of range: see [`TriMesh::validate`].
     pub fn is_closed(&self) -> bool {
         self.edge_uses().chunk_by(is_same_edge).all(|run| imbalance(&self.triangles, run) == 0)
     }
 
     /// Whether it is closed and no edge has more than two triangles.
+    ///
+    /// # Panics
+    /// As [`TriMesh::is_closed`].
     pub fn is_manifold(&self) -> bool {
         let is_whole = |run: &[Use]| run.len() == 2 && imbalance(&self.triangles, run) == 0;
         self.edge_uses().chunk_by(is_same_edge).all(is_whole)
     }
 
     /// Vertices minus edges plus faces, counting only used vertices: 2 for a sphere.
+    ///
+    /// # Panics
+    /// As [`TriMesh::is_closed`].
     pub fn euler_characteristic(&self) -> i64 {
         let used =
             used(self.positions.len(), &self.triangles).map_or(self.positions.len(), |used| used.len());
@@ -163,7 +172,7 @@ pub fn drop_marked<T>(values: &mut Vec<T>, marks: &[bool]) {
     values.retain(|_| marks.next() != Some(&true));
 }
 
-/// Re-indexes corners after marked vertices, which none of them is, were dropped.
+/// Re-indexes corners for when the marked items are dropped; no corner names one of these.
 pub fn renumber_kept(corners: &mut [u32], is_dropped: &[bool]) {
     let mut kept = 0;
     let number = |is_dropped: &bool| {

@@ -87,6 +87,7 @@ impl PolygonMesh {
         let (arrays, uvs) = (std::mem::take(&mut self.arrays), self.uvs.take());
         let (mut corners, mut faces) = (Vec::new(), Vec::new());
         if !arrays.is_empty() || uvs.as_ref().is_some_and(|uvs| uvs.corners.is_some()) {
+            corners.reserve(self.triangle_count());
             self.cut_all(|begin, _, triangle| corners.push(triangle.map(|corner| begin + corner)));
         }
         if !arrays.is_empty() {

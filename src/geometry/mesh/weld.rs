@@ -112,7 +112,7 @@ impl Boundary {
         let named = |corners: &[u32; 3]| corners.map(|vertex| firsts[vertex as usize]);
         let whole = triangles.iter().map(named).filter(|[a, b, c]| a != b && b != c && c != a);
         let sides = |[a, b, c]: [u32; 3]| [[a, b], [b, c], [c, a]].map(|[i, j]| (i.min(j), i.max(j)));
-        // Few edges begin at one vertex.
+        // Short lists: few edges begin at one vertex.
         let mut ends = Lists::new(firsts.len(), whole.flat_map(sides));
         ends.each_mut(|ends| ends.sort_unstable());
         let mut is_open = vec![false; firsts.len()];

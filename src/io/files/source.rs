@@ -38,8 +38,7 @@ pub fn check() -> Result<()> {
 
 /// Fails if readers must stop. Called for each item of a file that is parsed; it looks every `piece` items.
 ///
-/// # Errors
-/// A text that nobody sees: the flag tells.
+/// # Errors Readers must stop. The text is never shown: callers look at the flag.
 pub fn go_on(item: usize, piece: usize) -> Parsed<()> {
     if item.is_multiple_of(piece) && is_stopped() { Err("stopped".into()) } else { Ok(()) }
 }

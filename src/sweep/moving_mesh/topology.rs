@@ -213,6 +213,9 @@ impl Topology {
             .map(|edge| (self.edges[edge], self.imbalance(edge)))
             .filter(|(_, imbalance)| *imbalance != 0)
             .collect();
+        if open.is_empty() {
+            return false;
+        }
         let mut groups = Sets::new(self.vertex_count());
         open.iter().for_each(|([i, j], _)| groups.join(*i, *j));
         let mut loops: BTreeMap<u32, Vec<([u32; 2], i32)>> = BTreeMap::new();

@@ -25,12 +25,12 @@ function(refuse_versions package)
   endforeach()
 endfunction()
 
-# program(NAME SOURCE LIBRARY...): a test of that name, which also links what all of them need.
+# program(NAME SOURCE LIBRARY...): a test of that name, which also links what all of them need and may take LIMIT seconds.
 function(program name source)
   add_executable(${name} ${source})
   target_link_libraries(${name} PRIVATE ${ARGN} ${NEEDED})
   add_test(NAME ${name} COMMAND ${name})
-  set_tests_properties(${name} PROPERTIES TIMEOUT 600)
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${LIMIT})
 endfunction()
 
 # A plug-in that holds the archive, found in two ways, exports its own function, and none of the archive's.

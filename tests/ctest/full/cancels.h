@@ -23,7 +23,8 @@ typedef struct stepped {
 /* A step that looks at itself from within. */
 typedef struct watch {
     const stepped *of;
-    frz_context *other;
+    frz_context *other; /* that nothing uses */
+    frz_context *own;   /* of the step */
     void *it;
     int polls;
 } watch;
@@ -33,6 +34,7 @@ static inline int look_within(void *user, const frz_progress *progress) {
     (void)progress;
     ++state->polls;
     state->of->try_others(state->other, state->it);
+    state->of->try_others(state->own, state->it);
     state->of->destroy(state->it);
     CHECK(strstr(frz_last_error(), "in use") != NULL);
     return 0;
@@ -53,7 +55,7 @@ static inline void cancel_everywhere(const stepped *of, bytes before) {
     want = of->save(quiet, it);
     for (threads = 0; threads <= 2; threads += 2) {
         frz_context *ctx = context_on(threads);
-        watch inner = {of, quiet, NULL, 0};
+        watch inner = {of, quiet, ctx, NULL, 0};
         hasty state = {ctx, 0, 0};
         frz_status status = FRZ_CANCELLED;
         pthread_t thread;

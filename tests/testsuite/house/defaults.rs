@@ -22,8 +22,8 @@ fn text(path: &Path) -> String {
 
 /// Names of keys that have a default, by the reference of all keys, which another test compares with their declarations.
 fn declared() -> BTreeSet<String> {
-    let reference = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/scene.md");
-    let text = fs::read_to_string(reference).unwrap();
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    let text = ["scene.md", "surface.md"].map(|name| fs::read_to_string(docs.join(name)).unwrap()).concat();
     let rows = text.lines().filter(|line| line.starts_with("| `"));
     let cells = rows.map(|row| row.split(" | ").map(str::trim).collect::<Vec<_>>());
     let with_default = cells.filter(|cells| cells.len() > 3 && cells[2].starts_with('`'));
@@ -50,7 +50,7 @@ fn a_default_is_declared_once() {
     let mut files = Vec::new();
     sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/scene"), &mut files);
     let declared = declared();
-    for name in ["opaque_depth", "friction", "falls_height", "thickens_from", "turbulence", "fps", "kept"] {
+    for name in ["opaque_depth", "friction", "falls_height", "thickens_from", "turbulence", "fps", "kept", "min_drop"] {
         assert!(declared.contains(name), "{name} is not among {declared:?}");
     }
     let second = |path: &PathBuf| {
