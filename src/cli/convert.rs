@@ -161,7 +161,8 @@ pub struct MeshFile<'a> {
 }
 
 impl MeshFile<'_> {
-    /// Writes a mesh. Files of USD have velocities of their own: `velocities` chooses them (m/s), given those among the arrays.
+    /// Writes a mesh. USD stores velocities (m/s) as an attribute, not as an array: `velocities` returns them; it gets those found among
+    /// the arrays.
     pub fn write(
         &self,
         mesh: &TriMesh,

@@ -106,7 +106,7 @@ pub fn of_frame(path: &Path, frame: i32) -> PathBuf {
     Pattern::parse(path).map_or_else(|| path.to_path_buf(), |pattern| pattern.path(frame))
 }
 
-/// The only frame of what does not move.
+/// Frame 1: what is made if no frames are chosen.
 pub fn one_frame() -> FrameChoice {
     FrameChoice::from(Frames { first: 1, last: 1 })
 }

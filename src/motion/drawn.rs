@@ -19,7 +19,7 @@ pub(super) struct Faces {
     vertices: usize,
     triangles: Vec<[u32; 3]>,
     uvs: Option<Uvs>,
-    pub moving: Moving,
+    pub used: Used,
 }
 
 impl Faces {
@@ -27,8 +27,8 @@ impl Faces {
     pub fn new(polygons: PolygonMesh) -> (Self, Vec<Vec3>) {
         let (mesh, uvs) = polygons.into_textured();
         let (vertices, triangles) = (mesh.positions.len(), mesh.triangles);
-        let moving = Moving::of(vertices, &triangles);
-        (Self { vertices, triangles, uvs, moving }, mesh.positions)
+        let used = Used::of(vertices, &triangles);
+        (Self { vertices, triangles, uvs, used }, mesh.positions)
     }
 
     /// The mesh as it is written.
@@ -38,19 +38,19 @@ impl Faces {
 
     /// Triangles over the vertices that they use.
     pub fn triangles(&self) -> &[[u32; 3]] {
-        self.moving.triangles(&self.triangles)
+        self.used.triangles(&self.triangles)
     }
 }
 
-/// The vertices that move triangles: those that they use.
-pub(super) struct Moving {
+/// The vertices that triangles use: only these are posed.
+pub(super) struct Used {
     /// Their number.
     pub count: usize,
     /// These vertices, and the triangles over them; `None` if triangles use all.
     own: Option<(Vec<u32>, Vec<[u32; 3]>)>,
 }
 
-impl Moving {
+impl Used {
     /// Those of `count` vertices.
     pub fn of(count: usize, triangles: &[[u32; 3]]) -> Self {
         let Some(used) = used(count, triangles) else { return Self { count, own: None } };

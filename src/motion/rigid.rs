@@ -163,18 +163,18 @@ impl Motion for Rigid {
     }
 
     fn vertex_count(&self) -> usize {
-        self.faces.moving.count
+        self.faces.used.count
     }
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         self.drawn_pose(time, out)?;
-        self.faces.moving.keep(out);
+        self.faces.used.keep(out);
         Ok(())
     }
 
     fn pose_as_read(&self, _time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         out.clone_from(&self.positions);
-        self.faces.moving.keep(out);
+        self.faces.used.keep(out);
         Ok(())
     }
 

@@ -126,12 +126,12 @@ impl Motion for MeshSequence {
     }
 
     fn vertex_count(&self) -> usize {
-        self.faces.moving.count
+        self.faces.used.count
     }
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         self.drawn_pose(time, out)?;
-        self.faces.moving.keep(out);
+        self.faces.used.keep(out);
         Ok(())
     }
 

@@ -12,7 +12,7 @@ pub fn refill<T>(list: &mut Vec<T>, items: impl IntoIterator<Item = T>) {
     list.extend(items);
 }
 
-/// Divides each of some lists at an index, or at its end if that comes first.
+/// Divides each of some lists at an index, or at its end if that comes first: lists of scalars that a liquid does not have are empty.
 pub fn split_each<T, const N: usize>(lists: [&mut [T]; N], at: usize) -> [[&mut [T]; N]; 2] {
     let mut behind = [(); N].map(|()| Default::default());
     let mut ends = behind.iter_mut();

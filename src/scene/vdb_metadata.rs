@@ -1,4 +1,4 @@
-//! What .vdb files say of their frame.
+//! Metadata that .vdb files have about their frame.
 
 use super::Scene;
 use crate::vdb::MetaValue;

@@ -1,7 +1,6 @@
 //! Materials: the viscosity of liquids.
 
-use crate::error::Result;
-use crate::numeric::checks::ensure;
+use crate::error::{Error, Result};
 use crate::numeric::digits;
 
 /// A liquid.
@@ -74,9 +73,11 @@ impl Liquid {
     /// `Argument`, naming the field and its range.
     pub fn validate(&self) -> Result<()> {
         let check = |name: &str, value: f64, low: f64, high: f64| {
-            let holds = (low..=high).contains(&value);
+            if (low..=high).contains(&value) {
+                return Ok(());
+            }
             let (value, low, high) = (digits::given(value), digits::end(low), digits::end(high));
-            ensure(holds, format_args!("{name} = {value} is not within {low} to {high}"))
+            Err(Error::argument(format!("{name} = {value} is not within {low} to {high}")))
         };
         check("viscosity", self.viscosity, 0.0, 1e6)?;
         if let Some(law) = &self.thinning {

@@ -83,7 +83,7 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
         if let Some(what) = warning(&repaired) {
             log::warn!("{}: {what}", from.display());
         }
-        let words = in_words(&from, &to, &detail.mesh, &repaired, cell);
+        let words = (!args.json).then(|| in_words(&from, &to, &detail.mesh, &repaired, cell));
         let mut report = report(&detail.mesh, &repaired, cell);
         report["file"] = json!(from.display().to_string());
         report["output"] = json!(to.display().to_string());
@@ -98,7 +98,7 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
             session.ctx.phase("carry", carry).during()?
         };
         args.write(&to, frame, &detail).during()?;
-        if !args.json {
+        if let Some(words) = words {
             output::print(&words).during()?;
         }
         reports.push(report);

@@ -14,7 +14,7 @@ mod uri;
 use std::collections::HashMap;
 use std::path::Path;
 
-use super::drawn::Moving;
+use super::drawn::Used;
 use super::{Drawn, Motion};
 use crate::error::{Error, Result};
 use crate::geometry::{DVec3, TriMesh};
@@ -70,7 +70,7 @@ pub struct Character {
     /// Node indices, parents first.
     order: Vec<usize>,
     vertices: Vertices,
-    moving: Moving,
+    used: Used,
     clip: Option<Clip>,
     play: Play,
     kinks: Vec<f64>,
@@ -104,9 +104,9 @@ impl Character {
         let kinks = clip.as_ref().map(Clip::kinks).unwrap_or_default();
         let rest: Vec<_> = nodes.iter().map(|node| node.rest.clone()).collect();
         vertices.face_outward(&nodes::globals(&nodes, &order, &rest));
-        let moving = Moving::of(vertices.count, &vertices.triangles);
+        let used = Used::of(vertices.count, &vertices.triangles);
         let (jump, content) = (None, file.content);
-        let mut character = Self { nodes, order, vertices, moving, clip, play, kinks, jump, content };
+        let mut character = Self { nodes, order, vertices, used, clip, play, kinks, jump, content };
         character.jump = character.find_jump();
         Ok(character)
     }
@@ -230,7 +230,7 @@ impl Character {
         let (mut first, mut last) = (Vec::new(), Vec::new());
         for (time, pose) in [(clip.start, &mut first), (clip.end, &mut last)] {
             self.pose_at_own(time, pose);
-            self.moving.keep(pose);
+            self.used.keep(pose);
         }
         let size = first.iter().fold((first[0], first[0]), |(l, h), p| (l.inf(p), h.sup(p)));
         let farthest = first.iter().zip(&last).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
@@ -240,16 +240,16 @@ impl Character {
 
 impl Motion for Character {
     fn triangles(&self) -> &[[u32; 3]] {
-        self.moving.triangles(&self.vertices.triangles)
+        self.used.triangles(&self.vertices.triangles)
     }
 
     fn vertex_count(&self) -> usize {
-        self.moving.count
+        self.used.count
     }
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         self.pose_at_own(self.own_time(time), out);
-        self.moving.keep(out);
+        self.used.keep(out);
         Ok(())
     }
 

@@ -167,7 +167,9 @@ impl Fog {
             nodes: Vec::new(),
             blocks: Vec::new(),
             // Most fogs have at most one value that whole blocks share.
-            samples: Vec::with_capacity(dense + 1),
+            samples: Vec::with_capacity(
+                1 + filled.iter().flatten().filter(|filled| matches!(filled, Filled::Dense(_))).count(),
+            ),
             bounds: None,
         };
         let mut even: HashMap<u32, u32> = HashMap::new();

@@ -62,7 +62,7 @@ pub enum Fallback {
 /// The key's line in the scene that `frazil new` prints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Example {
-    /// Another value than the default.
+    /// Its value, if it is not the default.
     pub value: Option<&'static str>,
     /// Whether the scene to begin with has it; else it is commented out.
     pub is_shown: bool,
@@ -96,7 +96,7 @@ pub const fn required(example: &'static str) -> Unset {
 }
 
 impl Unset {
-    /// The example has another value than the default.
+    /// The value of the example.
     pub const fn such_as(self, value: &'static str) -> Self {
         Self { example: Example { value: Some(value), is_shown: false }, ..self }
     }

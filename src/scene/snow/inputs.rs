@@ -24,7 +24,7 @@ use crate::vdb::{FloatGrid, GridClass, VectorGrid, distances, file};
 /// Half width of the snow's narrow band (cells).
 const HALF_WIDTH: f32 = 3.0;
 
-/// Advice about a mesh of ground or top that lies far from the origin: no key moves it.
+/// Advice about a mesh of ground or top that lies far from the origin.
 const FOR_SNOW: &str = "give snow.origin nearby, which is subtracted in 64 bits, or save it near the origin and move the scene there too";
 
 /// Contents of a scene's files.

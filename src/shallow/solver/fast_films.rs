@@ -29,7 +29,7 @@ pub const NORMAL: u32 = 0x3f80_3f80;
 pub struct Fast {
     /// Inertia factors of the pipes of each column, to the east and to the south ([`packed`]); of rows that have fast pipes.
     pub(super) light: PerColumn<u32>,
-    /// Whether each strip has fast pipes; of those rows.
+    /// Whether each strip has fast pipes; only valid in rows that have some.
     pub(super) strips: Vec<bool>,
     rows: Vec<bool>,
 }

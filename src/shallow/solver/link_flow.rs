@@ -40,6 +40,7 @@ impl LinkFlow {
 
     /// Replaces a range of links by others with these fluxes and remainders.
     pub fn replace(&mut self, part: Range<usize>, flux: &[f32], left: &[f32], scalars: usize) {
+        debug_assert_eq!(flux.len(), left.len());
         self.flux.splice(part.clone(), flux.iter().copied());
         self.left.splice(part.clone(), left.iter().copied());
         self.transfer.splice(part.clone(), repeat_n(0.0, flux.len()));

@@ -70,13 +70,12 @@ impl LinkPart<'_> {
             };
             let fall = (base[i] + own).saturating_sub(eta);
             let depth = [own as f32, beyond as f32];
-            self.set_flux(
-                at,
-                match is_still {
-                    true => radiated(step, fall, depth),
-                    false => driven::<K>(step, fall, depth, self.flux[at], open),
-                },
-            );
+            let flux = if is_still {
+                radiated(step, fall, depth)
+            } else {
+                driven::<K>(step, fall, depth, self.flux[at], open)
+            };
+            self.set_flux(at, flux);
         }
     }
 

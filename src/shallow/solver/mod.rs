@@ -1,6 +1,6 @@
 //! The state of the liquid, and one step of it (thesis 4.1.2, Alg. 4.1).
 //!
-//! A step is one pass over the rows (`rows/`): fluxes (`solver/viscous_flux.rs`, `fast_films.rs`, `link_step.rs`), their scaling
+//! A step is one pass over the rows (`rows/`): fluxes (`viscous_flux.rs`, `fast_films.rs`, `link_step.rs`), their scaling
 //! (`transfers/scale.rs`) and transfers (`transfers/whole_units.rs`), on the strips that are wet or beside wet ones, unless these are at
 //! rest (`active.rs`, `rest.rs`), with one band of rows for each thread (`rows/bands.rs`, `rows/band_views.rs`). Columns that are full to
 //! their ceiling form a separate network, which is solved first (`pressurised/network.rs`, `pressurised/heads.rs`, `transfers/limiter.rs`);
@@ -56,7 +56,7 @@ pub struct Flow {
     pub(super) links: LinkFlow,
     pub(super) overflow_edges: OverflowEdges,
     active: Active,
-    /// Including upper bounds of the depths of rows.
+    /// The bands of rows, with an upper bound of the depth in each row.
     pub(super) bands: Bands,
     pub(super) network: Network,
     /// The step length (s) that fluxes refer to.

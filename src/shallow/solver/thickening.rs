@@ -1,4 +1,4 @@
-//! Thickening: viscosity that depends on a scalar: blood that clots with age, and that irrigation dilutes.
+//! Thickening: the viscosity depends on a scalar, as that of blood that clots with age and is diluted by irrigation.
 //!
 //! The drag of a pipe is 3 nu / H^2 over its openness (Eq. 4.5): a higher viscosity acts like a lower openness. Each frame starts from the
 //! concentrations of its columns and uses the resulting openness in all its steps.

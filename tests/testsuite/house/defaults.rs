@@ -50,7 +50,9 @@ fn a_default_is_declared_once() {
     let mut files = Vec::new();
     sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/scene"), &mut files);
     let declared = declared();
-    for name in ["opaque_depth", "friction", "falls_height", "thickens_from", "turbulence", "fps", "kept", "min_drop"] {
+    for name in
+        ["opaque_depth", "friction", "falls_height", "thickens_from", "turbulence", "fps", "kept", "min_drop"]
+    {
         assert!(declared.contains(name), "{name} is not among {declared:?}");
     }
     let second = |path: &PathBuf| {

@@ -22,7 +22,7 @@ pub struct Sculpt {
     pub mesh: DetailedMesh,
     /// Detail retention of each vertex: the share that never fades; empty: none.
     pub detail_retention: Vec<f32>,
-    /// Sentences about what it lacks, or has to no effect.
+    /// Warnings about data that it lacks, or that is ignored.
     warnings: Vec<String>,
 }
 

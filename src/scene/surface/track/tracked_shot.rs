@@ -300,7 +300,7 @@ impl<'a> TrackedShot<'a> {
         Ok(at)
     }
 
-    /// Takes what a mesh carries, and what eases its coming changes, through a change; `triangles` are those before it, if it is eased.
+    /// Carries a mesh's data and its easing targets over a change; `triangles` are those before it, if changes are eased.
     fn carry(
         &self,
         ctx: &Context,

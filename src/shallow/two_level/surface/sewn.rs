@@ -95,8 +95,10 @@ impl Sewn {
         self.find_partners(all, stitches);
         self.find_heights(all, &stitches.sewn);
         self.find_slopes(all, stitches);
+        let frames = [&detail.fine.columns, &detail.coarse.columns].map(|columns| Frame::of(columns, layout));
         for (at, &id) in stitches.sewn.iter().enumerate() {
-            self.put(all, at, id, target);
+            let is_coarse = id as usize >= detail.fine.columns.len();
+            self.put(all, &frames[usize::from(is_coarse)], at, id, target);
         }
     }
 
@@ -163,10 +165,10 @@ impl Sewn {
         }
     }
 
-    /// Writes one vertex.
-    fn put(&self, all: Columnar<'_>, at: usize, id: u32, target: &mut Target<'_>) {
+    /// Writes one vertex; `frame` is that of its cells.
+    fn put(&self, all: Columnar<'_>, frame: &Frame, at: usize, id: u32, target: &mut Target<'_>) {
         let (columns, _, index) = all.of(id);
-        let (frame, depth) = (Frame::of(columns, all.layout), all.depth(id));
+        let depth = all.depth(id);
         let [column, row] = columns.cell(index).map(|at| at as i32);
         let [x, y, z] = self.slopes[at];
         let mean = |of: &dyn Fn(u32) -> f32| {

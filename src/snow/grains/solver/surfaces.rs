@@ -120,7 +120,11 @@ impl<'a> Surfaces<'a> {
             }
         }
         position = from;
-        let _ = (0..ROUNDS).any(|_| self.push_out(&mut position, nearby, true));
+        for _ in 0..ROUNDS {
+            if self.push_out(&mut position, nearby, true) {
+                break;
+            }
+        }
         (way(position), true)
     }
 
