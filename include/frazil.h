@@ -3657,8 +3657,8 @@ frz_status frz_base_set_params(frz_base *base,
  *
  * Results replace the layer's grids only at the end: after a failure or a cancel the layer is as it was before.
  *
- * bodies: count bodies; NULL with a count of 0. A vertex farther than 131072 voxels from the middle of the snow is out of reach:
- *     FRZ_ERROR_ARGUMENT names its body, counted from 0, and nothing is changed.
+ * bodies: count bodies; NULL with a count of 0. What passes farther than 131072 voxels from the middle of the snow is left out. If a body
+ *     touches the snow while a vertex of it is that far away, FRZ_ERROR_ARGUMENT names it, counted from 0, and nothing is changed.
  * count: number of bodies.
  * dt: length of the step (s). 0: the bodies are cut out at their positions at its beginning, as the first frame of a shot requires.
  * frame: the value that frz_base_touched takes where the snow changes, -16777216 to 16777216.

@@ -64,12 +64,13 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Parsed<ParticleData> {
     let axes = ["x", "y", "z"].map(position);
     let positions: Vec<DVec3> =
         (0..vertices.count).map(|row| DVec3::from(axes.map(|axis| columns[axis][row]))).collect();
-    let attributes = attributes(&vertices, &names, &columns)?;
+    let attributes = attributes(&vertices, &names, &mut columns)?;
     let voxel_size = body.comments.iter().find_map(|line| line.strip_prefix(VOXEL)?.trim().parse().ok());
     Ok(ParticleData { positions, attributes, voxel_size })
 }
 
-fn attributes(vertices: &Element, names: &[String], columns: &[Vec<f64>]) -> Parsed<Vec<Attribute>> {
+/// Values other than the position; takes the columns that hold scalars.
+fn attributes(vertices: &Element, names: &[String], columns: &mut [Vec<f64>]) -> Parsed<Vec<Attribute>> {
     let mut out = Vec::new();
     let index = |name: &str| names.iter().position(|other| other == name);
     for (n, (name, property)) in names.iter().zip(&vertices.properties).enumerate() {
@@ -86,20 +87,17 @@ fn attributes(vertices: &Element, names: &[String], columns: &[Vec<f64>]) -> Par
         if ['y', 'z'].into_iter().any(|end| of_vector(end).is_some()) {
             continue;
         }
-        let column = &columns[n];
         let (name, values) = match of_vector('x') {
             Some((stem, axes)) => {
                 let vector = |row: usize| axes.map(|axis| columns[axis][row] as f32);
-                (stem, vectors((0..column.len()).map(vector)))
+                (stem, vectors((0..vertices.count).map(vector)))
             }
             None => {
                 let is_real = property.is_float() || ["id", "active", "trapped"].contains(&&**name);
-                let numbers = if is_real {
-                    Numbers::Real(column.clone())
-                } else {
-                    Numbers::Whole(whole(name, column)?)
-                };
-                let fits_int = column.iter().all(|&value| f64::from(value as i32) == value);
+                let column = std::mem::take(&mut columns[n]);
+                let fits_int = !is_real && column.iter().all(|&value| f64::from(value as i32) == value);
+                let numbers =
+                    if is_real { Numbers::Real(column) } else { Numbers::Whole(whole(name, &column)?) };
                 (&**name, scalars(name, numbers, fits_int)?)
             }
         };
