@@ -295,11 +295,11 @@ fn finished(
     };
     let sources: Vec<Source> = draft.sources.iter().map(original).collect();
     let origin = DVec3::from(lattice.origin.map(f64::from));
-    let place = |(at, place): (usize, &DVec3)| match closed.mesh.positions.get(at) {
+    let position = |(at, position): (usize, &DVec3)| match closed.mesh.positions.get(at) {
         Some(position) => *position,
-        None => ((place + origin) * lattice.voxel).cast(),
+        None => ((position + origin) * lattice.voxel).cast(),
     };
-    let positions = draft.positions.iter().enumerate().map(place).collect();
+    let positions = draft.positions.iter().enumerate().map(position).collect();
     let mesh = TriMesh { positions, triangles: draft.triangles };
     let used = crate::geometry::mesh::used(mesh.positions.len(), &mesh.triangles);
     let names: Vec<u32> = used.unwrap_or_else(|| (0..mesh.positions.len() as u32).collect());

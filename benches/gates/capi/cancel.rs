@@ -13,7 +13,7 @@ use frazil::capi::runtime::context::*;
 use frazil::capi::snow::base_layer::*;
 use frazil::capi::snow::layer::*;
 
-use crate::capi::host::{self, Threads, body_between, mesh, usual, view, works, written};
+use crate::capi::host::{self, Threads, body_between, defaults, mesh, view, works, written};
 use crate::common::shapes;
 use crate::snow::grains::Random;
 
@@ -81,7 +81,7 @@ impl Host {
 
     /// A small layer.
     fn layer(&self) -> frz_snow_desc {
-        let mut desc = usual(frz_snow_desc_init);
+        let mut desc = defaults(frz_snow_desc_init);
         desc.voxel_size = VOXEL;
         desc.depth = 0.2;
         desc.area = [-0.3, -0.3, 0.3, 0.3];

@@ -63,7 +63,7 @@ pub fn sized<T>() -> T {
 }
 
 /// A struct with the defaults that a function fills in.
-pub fn usual<T>(init: unsafe extern "C" fn(*mut T, usize) -> frz_status) -> T {
+pub fn defaults<T>(init: unsafe extern "C" fn(*mut T, usize) -> frz_status) -> T {
     let mut out = sized();
     // SAFETY: the struct is there, and has this size.
     works(unsafe { init(&mut out, size_of::<T>()) });
@@ -72,7 +72,7 @@ pub fn usual<T>(init: unsafe extern "C" fn(*mut T, usize) -> frz_status) -> T {
 
 /// A body that goes from one pose to another; both, and the triangles, must outlive it.
 pub fn body_between([from, to]: [&[[f32; 3]]; 2], triangles: &[[u32; 3]]) -> frz_body {
-    let mut body = usual(frz_body_init);
+    let mut body = defaults(frz_body_init);
     body.id = 1;
     (body.positions, body.positions_end) = (view(from), view(to));
     body.indices = view(triangles.as_flattened());

@@ -20,7 +20,7 @@ use frazil::capi::snow::mist::*;
 use frazil::capi::snow::mist_params::*;
 use frazil::capi::snow::mist_points::*;
 
-use crate::capi::host::{sized, usual, view};
+use crate::capi::host::{defaults, sized, view};
 use crate::harness::Harness;
 use crate::reliability::step_meshes as meshes;
 use crate::reliability::watch::{Judged, PARTS, Tried, Watch};
@@ -111,7 +111,7 @@ impl Known {
 
 /// Domains, grounds and parameters of shallow liquids.
 fn liquid(tried: &mut Tried) -> (frz_shallow_params, frz_shallow_domain, Vec<f32>) {
-    let mut params = usual(frz_shallow_params_init);
+    let mut params = defaults(frz_shallow_params_init);
     let mut domain: frz_shallow_domain = sized();
     domain.cell = tried.any(1e-4, 1e-1);
     domain.cells = [2 * (2 + tried.below(14)) as u32, 2 * (2 + tried.below(14)) as u32];
@@ -289,7 +289,7 @@ fn detail(tried: &mut Tried) {
 
 /// Parameters of grains.
 pub fn grain_params(tried: &mut Tried, radius: f64) -> frz_grains_params {
-    let mut params = usual(frz_grains_params_init);
+    let mut params = defaults(frz_grains_params_init);
     params.radius = radius;
     params.flags = FRZ_GRAINS_FLOOR * u32::from(tried.chance(0.7));
     params.flags |= FRZ_GRAINS_RESTLESS * u32::from(tried.chance(0.3));
@@ -343,7 +343,7 @@ fn grains(tried: &mut Tried) {
 
 /// Parameters of mist.
 pub fn mist_params(tried: &mut Tried, cell: f64) -> frz_mist_params {
-    let mut params = usual(frz_mist_params_init);
+    let mut params = defaults(frz_mist_params_init);
     params.cell = cell;
     (params.turbulence_size, params.noise_size) = (cell * tried.any(8.0, 100.0), cell * tried.any(1.0, 20.0));
     params.from_speed = tried.any(1e-2, 10.0);

@@ -16,7 +16,7 @@ use frazil::capi::tracker::follower::*;
 use frazil::capi::tracker::mesh::*;
 use frazil::geometry::TriMesh;
 
-use crate::capi::host::{self, body_between, sized, usual, view, works};
+use crate::capi::host::{self, body_between, defaults, sized, view, works};
 use crate::reliability::step_calls::{grain_params, mist_params, step_length};
 use crate::reliability::watch::Tried;
 
@@ -48,7 +48,7 @@ fn cube(half: f32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
 }
 
 fn snow(tried: &Tried) -> *mut frz_grid {
-    let mut desc = usual(frz_snow_desc_init);
+    let mut desc = defaults(frz_snow_desc_init);
     (desc.voxel_size, desc.depth, desc.area) = (VOXEL, 0.1, [-0.2, -0.2, 0.2, 0.2]);
     // SAFETY: the pointers are valid.
     host::made(|snow| unsafe { frz_snow_layer(tried.ctx(), &desc, snow) })
@@ -75,7 +75,7 @@ fn each_press(
 
 pub fn base(tried: &mut Tried) {
     each_press(tried, 16, |tried, base, body, frame| {
-        let mut params = usual(frz_base_params_init);
+        let mut params = defaults(frz_base_params_init);
         let dt = step_length(tried);
         params.tolerance = tried.any(1e-3, 1.0);
         params.noise.amplitude = tried.between(0.0, 3.0) * VOXEL;
@@ -172,7 +172,7 @@ impl Particles {
 }
 
 fn tracker_params(tried: &mut Tried) -> frz_tracker_params {
-    let mut params = usual(frz_tracker_params_init);
+    let mut params = defaults(frz_tracker_params_init);
     (params.spacing, params.cell) = (1.0, 0.5);
     params.change = tried.any(1e-3, 100.0);
     params.half_life = if tried.chance(0.5) { f64::INFINITY } else { tried.any(1e-2, 10.0) };

@@ -134,7 +134,7 @@ fn surfaces(ctx: &Context) -> u64 {
 fn hash_drawn(surface: &mut Surface, balls: &mut Balls, liquid: &Shallow) -> u64 {
     let columns = liquid.columns();
     let mut velocity = vec![[0.0; 2]; columns.len()];
-    liquid.velocities(&mut velocity).expect("as many places");
+    liquid.velocities(&mut velocity).expect("as many positions");
     let depths = Depths {
         depth: liquid.depths(),
         velocity: &velocity,

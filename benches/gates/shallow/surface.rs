@@ -59,7 +59,7 @@ fn timed(liquid: &mut Shallow) -> (f64, String) {
     });
     let mut velocity = vec![[0.0; 2]; liquid.columns().len()];
     let all = each_frame(liquid, |liquid| {
-        liquid.velocities(&mut velocity).expect("as many places");
+        liquid.velocities(&mut velocity).expect("as many positions");
         let depths = Depths {
             depth: liquid.depths(),
             velocity: &velocity,

@@ -12,7 +12,7 @@ use frazil::capi::{frz_span, frz_status};
 use frazil::geometry::{DVec3, TriMesh, Vec3};
 
 use crate::capi::cancel_latency;
-use crate::capi::host::{self, Threads, made, sized, usual, view, works, written};
+use crate::capi::host::{self, Threads, defaults, made, sized, view, works, written};
 use crate::common::liquids::{ball, context, filled, own_surface, turned};
 use crate::harness::Harness;
 use crate::snow::grains::Random;
@@ -20,7 +20,7 @@ use crate::snow::grains::Random;
 /// Initial distance between particles (m), and time between frames (s).
 const SPACING: f64 = 0.01;
 const FRAME: f64 = 1.0 / 24.0;
-/// Frames ahead, as is usual.
+/// Frames ahead, the default.
 const AHEAD: u32 = 4;
 /// Two blocks of liquid that meet face to face in one step: their edge, and how far apart their outermost particles are before it and
 /// after it (spacings). All of both faces is then rebuilt.
@@ -44,7 +44,7 @@ struct Host {
 
 impl Host {
     fn new(places: [Vec<DVec3>; 2], mesh: &TriMesh, is_rebuilt: bool) -> Self {
-        let mut params = usual(frz_tracker_params_init);
+        let mut params = defaults(frz_tracker_params_init);
         params.spacing = SPACING;
         params.rebuild = u32::from(is_rebuilt);
         let mut host = Self {

@@ -11,7 +11,7 @@ use crate::surface::rebuilt_sequences::{Sequence, dambreak, made, spot_drop};
 use crate::surface::windings::depth_and_share;
 use crate::worst::Worst;
 
-/// Frames ahead, as is usual.
+/// Frames ahead, the default.
 const AHEAD: usize = 4;
 /// Frames of the caches from one look at the lattice to the next.
 const EVERY: usize = 5;

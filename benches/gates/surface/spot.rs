@@ -222,7 +222,7 @@ fn carried(own: &DetailedMesh, frames: &[DetailedMesh]) -> [(f64, &'static str);
     };
     let are_kept = f64::from(frames.iter().all(is_kept));
     [
-        (most, "all vertices of all frames, places and velocities in 32 bits"),
+        (most, "all vertices of all frames, positions and velocities in 32 bits"),
         (are_kept, "texture coordinates with seams, arrays of vertices, faces and corners"),
     ]
 }

@@ -74,12 +74,13 @@ pub unsafe extern "C" fn frz_grains_emit(
         let mut heap = change(grains)?;
         let grains = &mut heap.grains;
         ctx.allow("the grains", memory(grains.count().saturating_add(positions.count)))?;
-        let places = positions.finite("positions")?;
+        let emitted = positions.finite("positions")?;
         let velocities = velocities.finite("velocities")?;
-        let places: Vec<DVec3> = places.into_iter().map(|place| place.map(f64::from).into()).collect();
-        let id = ctx.phase_in_place("emit", || grains.emit(&places, &velocities, frame))?;
+        let emitted: Vec<DVec3> =
+            emitted.into_iter().map(|position| position.map(f64::from).into()).collect();
+        let id = ctx.phase_in_place("emit", || grains.emit(&emitted, &velocities, frame))?;
         heap.saved.take();
-        write_some(first, if places.is_empty() { -1 } else { i64::from(id) });
+        write_some(first, if emitted.is_empty() { -1 } else { i64::from(id) });
         Ok(())
     })
 }

@@ -44,8 +44,8 @@ static void begin_child(long first, frz_pool **pool, frz_context **ctx) {
 }
 
 /* The program: `calls` makes calls `first` to `last` of a seed in its process. */
-static int call_at_random(int count, char **arguments, long usual, void (*calls)(uint64_t seed, long first, long last)) {
-    const long total = count > 1 ? atol(arguments[1]) : usual;
+static int call_at_random(int count, char **arguments, long default_count, void (*calls)(uint64_t seed, long first, long last)) {
+    const long total = count > 1 ? atol(arguments[1]) : default_count;
     const uint64_t seed = count > 2 ? strtoull(arguments[2], NULL, 10) : 1;
     long first;
     int crashes = 0;

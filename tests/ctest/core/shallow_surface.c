@@ -111,9 +111,9 @@ static void meshes(frz_context *ctx) {
 /* Centimetres, Z up, left-handed axes and short indices. */
 static void layouts(frz_context *ctx) {
     frz_shallow *shallow = pool_of(ctx);
-    buffers usual = buffers_for(shallow), other = buffers_for(shallow);
-    const frz_shallow_size size = surface_of(ctx, shallow, NULL, &usual);
-    uint16_t *narrow = room((size_t)usual.bound.indices, 2);
+    buffers plain = buffers_for(shallow), other = buffers_for(shallow);
+    const frz_shallow_size size = surface_of(ctx, shallow, NULL, &plain);
+    uint16_t *narrow = room((size_t)plain.bound.indices, 2);
     frz_shallow_target target;
     frz_shallow_layout layout;
     uint64_t vertex, corner;
@@ -125,20 +125,20 @@ static void layouts(frz_context *ctx) {
         layout.flags = (uint32_t)flags, layout.scale = 100;
         CHECK(surface_of(ctx, shallow, &layout, &other).vertices == size.vertices);
         for (vertex = 0; vertex < size.vertices; ++vertex) {
-            const float *a = usual.positions + 3 * vertex, *b = other.positions + 3 * vertex;
+            const float *a = plain.positions + 3 * vertex, *b = other.positions + 3 * vertex;
             const float side = !left == !z_up ? 1.0f : -1.0f;
             CHECK(fabsf(100 * a[0] - b[0]) < 1e-4f && fabsf(100 * a[1] - b[z_up ? 2 : 1]) < 1e-4f);
             CHECK(fabsf(side * 100 * a[2] - b[z_up ? 1 : 2]) < 1e-4f);
-            CHECK(fabsf(100 * usual.depths[vertex] - other.depths[vertex]) < 1e-5f);
+            CHECK(fabsf(100 * plain.depths[vertex] - other.depths[vertex]) < 1e-5f);
         }
         for (corner = 0; corner < size.indices / 3; ++corner) CHECK(facing(&other, corner, z_up ? 2 : 1) > 0);
     }
-    target = target_of(&usual);
-    target.index_bits = 16, target.indices = span_of(narrow, (size_t)usual.bound.indices);
+    target = target_of(&plain);
+    target.index_bits = 16, target.indices = span_of(narrow, (size_t)plain.bound.indices);
     WORKS(frz_shallow_surface(ctx, shallow, NULL, &target, NULL));
-    for (corner = 0; corner < size.indices; ++corner) CHECK(narrow[corner] == usual.indices[corner]);
+    for (corner = 0; corner < size.indices; ++corner) CHECK(narrow[corner] == plain.indices[corner]);
     free(narrow);
-    buffers_free(&other), buffers_free(&usual);
+    buffers_free(&other), buffers_free(&plain);
     frz_shallow_destroy(shallow);
 }
 

@@ -189,7 +189,7 @@ static void attributes(const frz_grains *grains, int last) {
 /* Removed snow becomes grains; from the layer's handle, from two grids and after a restart they are the same. */
 static void snow_becomes_grains(frz_context *ctx, const ball *rest, const frz_grid *snow) {
     enum { LAST = 8, STOP = 4 };
-    const frz_grains_params params = usual();
+    const frz_grains_params params = defaults();
     frz_context *other = context_on(0);
     frz_grains *straight = grains_of(ctx, &params), *of_grids = grains_of(other, &params), *back = NULL;
     layer pressed = {base_on(ctx, snow), NULL, 0};

@@ -14,7 +14,7 @@ static inline frz_grains_params params_of(double radius) {
 }
 
 /* Those that suit the voxels of small_snow. */
-static inline frz_grains_params usual(void) {
+static inline frz_grains_params defaults(void) {
     frz_grains_params params = params_of(0.02 / 3);
     params.compression = 0.5;
     params.flags = FRZ_GRAINS_FLOOR;
@@ -67,7 +67,7 @@ static inline frz_grains_report move(frz_context *ctx, frz_grains *grains, const
 
 /* Some grains with a layer below them that has just been pressed. */
 static inline frz_grains *some(frz_context *ctx, layer *pressed, const ball *rest, const frz_grid *snow) {
-    const frz_grains_params params = usual();
+    const frz_grains_params params = defaults();
     frz_grains *grains = grains_of(ctx, &params);
     int frame;
     pressed->base = base_on(ctx, snow), pressed->before = NULL;

@@ -6,7 +6,7 @@
 #include <stddef.h>
 
 static void states(frz_context *ctx, const ball *rest, const frz_grid *snow) {
-    frz_grains_params params = usual();
+    frz_grains_params params = defaults();
     layer pressed;
     frz_grains *grains = some(ctx, &pressed, rest, snow), *none = NULL;
     bytes state = grains_state(ctx, grains), again;
@@ -36,7 +36,7 @@ static void states(frz_context *ctx, const ball *rest, const frz_grid *snow) {
     CHECK(none == NULL);
     params.radius = 0.005;
     FAILS(frz_grains_create(ctx, &params, state.data, state.size, &none), FRZ_ERROR_FILE, "the saved state has grains of");
-    params = usual();
+    params = defaults();
     for (i = 1; i < state.size; i += 1 + state.size / 50) {
         FAILS(frz_grains_create(ctx, &params, state.data, i, &none), FRZ_ERROR_FILE, "the saved state");
         ((unsigned char *)state.data)[i] ^= 4;
@@ -62,7 +62,7 @@ static void parameters(frz_context *ctx, const ball *rest, const frz_grid *snow)
     FAILS(frz_grains_set_params(grains, &params), FRZ_ERROR_ARGUMENT, "cannot change, it is 0.00666");
     FAILS(frz_grains_set_params(grains, NULL), FRZ_ERROR_ARGUMENT, "frz_grains_params is NULL");
     /* More grains than there may be: the step fails, and nothing is changed. */
-    params = usual();
+    params = defaults();
     params.max_grains = grains_count(grains);
     WORKS(frz_grains_set_params(grains, &params));
     memset(&report, 0xff, sizeof report);
@@ -114,7 +114,7 @@ static void parameters(frz_context *ctx, const ball *rest, const frz_grid *snow)
             {&params.lowest, (double)NAN, "lowest is not finite"},
         };
         size_t i;
-        params = usual();
+        params = defaults();
         for (i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
             const double good = *wrong[i].field;
             *wrong[i].field = wrong[i].value;
@@ -131,7 +131,7 @@ static void parameters(frz_context *ctx, const ball *rest, const frz_grid *snow)
         FAILS(frz_grains_create(ctx, &params, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "sub_steps = 1001 is not within 0 to 1000");
         params.sub_steps = 0, params.flags = 18;
         FAILS(frz_grains_create(ctx, &params, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "flags = 0x12");
-        /* A header without the last field leaves it as is usual. */
+        /* A header without the last field leaves it as the default. */
         params.flags = 0, params.active_distance = -1, params.struct_size = offsetof(frz_grains_params, active_distance);
         WORKS(frz_grains_create(ctx, &params, NULL, 0, &none));
         frz_grains_destroy(none), none = NULL;
@@ -154,7 +154,7 @@ typedef struct scene {
 } scene;
 
 static void *begin_grains(frz_context *ctx, const void *with, bytes state) {
-    const frz_grains_params params = usual();
+    const frz_grains_params params = defaults();
     (void)with;
     return resumed(ctx, &params, state);
 }

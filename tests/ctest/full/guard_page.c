@@ -53,7 +53,7 @@ static const guard_writer writers[] = {
 };
 
 int main(void) {
-    const frz_grains_params params = usual();
+    const frz_grains_params params = defaults();
     int failed;
     ctx = context_on(0);
     snow = small_snow(ctx);

@@ -94,7 +94,7 @@ static frz_mesh *mesh_of(frz_context *ctx, const shape *from, size_t triangles) 
 
 /* -- the shot -- */
 
-static frz_tracker_params usual(uint32_t rebuild) {
+static frz_tracker_params defaults(uint32_t rebuild) {
     frz_tracker_params params;
     WORKS(frz_tracker_params_init(&params, sizeof params));
     params.spacing = SPACING, params.rebuild = rebuild;
@@ -168,7 +168,7 @@ static void check_all_made(const frz_tracker *tracker, const shape *before, cons
 }
 
 static void a_bump_stays(frz_context *ctx, frz_context *alone, const frz_mesh *mesh, uint32_t rebuild) {
-    const frz_tracker_params params = usual(rebuild);
+    const frz_tracker_params params = defaults(rebuild);
     const frz_particles present = of(SCULPTED);
     frz_tracker *tracker = begin(ctx, mesh, &params), *back = NULL;
     frz_mesh *sculpt;
@@ -206,7 +206,7 @@ static void a_bump_stays(frz_context *ctx, frz_context *alone, const frz_mesh *m
 
 /* Detail halves in each frame, but what is painted to last on the edited mesh. */
 static void painted_detail_lasts(frz_context *ctx, const frz_mesh *mesh) {
-    frz_tracker_params params = usual(0);
+    frz_tracker_params params = defaults(0);
     const frz_particles present = of(SCULPTED);
     double heights[2];
     int lasting;
@@ -237,7 +237,7 @@ static void is_as_it_was(frz_context *ctx, const frz_tracker *tracker, bytes bef
 }
 
 static void refusals(frz_context *ctx, const frz_mesh *mesh) {
-    const frz_tracker_params params = usual(1);
+    const frz_tracker_params params = defaults(1);
     frz_tracker *tracker = begin(ctx, mesh, &params);
     frz_particles present = of(0), nothing = of(0);
     shape whole = sculpted(tracker, 0, 1);

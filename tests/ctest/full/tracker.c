@@ -33,7 +33,7 @@ static frz_mesh *mesh_of(frz_context *ctx, float radius) {
     return ball_mesh(ctx, &rest);
 }
 
-static frz_tracker_params usual(void) {
+static frz_tracker_params defaults(void) {
     frz_tracker_params params;
     WORKS(frz_tracker_params_init(&params, sizeof params));
     CHECK(params.cell == 0.5 && params.change == 0.5 && params.weighting == FRZ_TRACKER_AFFINE);
@@ -45,7 +45,7 @@ static frz_tracker_params usual(void) {
 static liquid frames[4], backwards[4];
 
 static frz_tracker *begin(frz_context *ctx, const frz_mesh *mesh, bytes state) {
-    const frz_tracker_params params = usual();
+    const frz_tracker_params params = defaults();
     const frz_particles first = of(&frames[0], 1, 0);
     frz_tracker *tracker = NULL;
     WORKS(frz_tracker_create(ctx, &params, mesh, state.data ? NULL : &first, state.data, state.size, &tracker));
@@ -144,7 +144,7 @@ static frz_status step_tracker(frz_context *ctx, void *it, const void *mesh) {
 }
 
 static void try_others(frz_context *ctx, void *it) {
-    const frz_tracker_params params = usual();
+    const frz_tracker_params params = defaults();
     const frz_particles from = of(&frames[0], 1, 0);
     float place[3];
     size_t size = 7;
@@ -169,7 +169,7 @@ static void refusals(void) {
     frz_context *ctx = context_on(1);
     frz_mesh *mesh = mesh_of(ctx, 0.31f), *other = mesh_of(ctx, 0.2f);
     frz_tracker *tracker = begin(ctx, mesh, NOTHING), *none = (frz_tracker *)ctx;
-    frz_tracker_params params = usual();
+    frz_tracker_params params = defaults();
     frz_particles first = of(&frames[0], 1, 1), then = of(&frames[1], 1, 1);
     bytes state = tracker_state(ctx, tracker);
     static liquid far;
@@ -177,18 +177,18 @@ static void refusals(void) {
     params.spacing = 0;
     FAILS(frz_tracker_create(ctx, &params, mesh, &first, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "spacing = 0");
     CHECK(none == NULL);
-    params = usual();
+    params = defaults();
     params.cell = 4;
     FAILS(frz_tracker_create(ctx, &params, mesh, &first, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "cell = 4");
     FAILS(frz_tracker_set_params(tracker, &params), FRZ_ERROR_ARGUMENT, "cell = 4");
-    params = usual();
+    params = defaults();
     params.weighting = 2;
     FAILS(frz_tracker_create(ctx, &params, mesh, &first, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "weighting = 2");
-    params = usual();
+    params = defaults();
     params.cell = 1;
     FAILS(frz_tracker_set_params(tracker, &params), FRZ_ERROR_ARGUMENT, "cell = 1 cannot change");
     FAILS(frz_tracker_create(ctx, &params, mesh, NULL, state.data, state.size, &none), FRZ_ERROR_FILE, "cell");
-    params = usual();
+    params = defaults();
     params.change = 0.25;
     WORKS(frz_tracker_set_params(tracker, &params));
     FAILS(frz_tracker_create(ctx, &params, mesh, NULL, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "frz_particles");

@@ -8,7 +8,7 @@ use frazil::capi::snow::grains_points::*;
 use frazil::capi::{frz_status, frz_view};
 
 use crate::capi::cancel_latency;
-use crate::capi::host::{Threads, usual, view, works, written};
+use crate::capi::host::{Threads, defaults, view, works, written};
 use crate::snow::grains::{FRAME, Random};
 
 /// Length (s) and sub-steps of a step: a part of a frame, as a whole one would take minutes to cancel so often.
@@ -25,7 +25,7 @@ struct Host {
 impl Host {
     fn new(random: &mut Random) -> Self {
         let mut host = Self { threads: Threads::new(2), grains: null_mut() };
-        let mut params = usual(frz_grains_params_init);
+        let mut params = defaults(frz_grains_params_init);
         (params.radius, params.sub_steps) = (0.0025, STEP.1);
         params.flags = FRZ_GRAINS_FLOOR | FRZ_GRAINS_RESTLESS;
         let apart = 1.1 * 2.0 * 0.0025;

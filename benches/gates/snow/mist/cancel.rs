@@ -9,7 +9,7 @@ use frazil::capi::snow::mist_points::*;
 use frazil::capi::{frz_status, frz_view};
 
 use crate::capi::cancel_latency;
-use crate::capi::host::{Threads, body_between, sized, usual, view, works, written};
+use crate::capi::host::{Threads, body_between, defaults, sized, view, works, written};
 use crate::common::shapes::sphere;
 use crate::snow::grains::{FRAME, Random};
 
@@ -30,7 +30,7 @@ struct Host {
 
 impl Host {
     fn new(random: &mut Random) -> Self {
-        let mut params = usual(frz_mist_params_init);
+        let mut params = defaults(frz_mist_params_init);
         (params.cell, params.from_speed, params.flags) = (CELL, 0.0, FRZ_MIST_FALLING);
         (params.turbulence, params.confinement) = (3.0, 0.3);
         let mesh = sphere(0.15, 24);
