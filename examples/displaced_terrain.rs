@@ -12,7 +12,7 @@ use frazil::render::{Camera, Light, Model, Models, Size};
 use frazil::shallow::columns::grid::{Grid, Heights};
 use frazil::shallow::material::Liquid;
 use frazil::shallow::sources::{FlowPoint, Kind};
-use frazil::shallow::surface::heights::minimum_heights::{Distance, Lifts};
+use frazil::shallow::surface::heights::minimum_heights::{Distance, MinimumHeights};
 use frazil::shallow::surface::{Depths, Indices, Layout, Surface, Target};
 use frazil::shallow::terrain::triangles;
 use frazil::shallow::{Params, Shallow};
@@ -70,7 +70,7 @@ fn poured(ctx: &Context, ground: &TriMesh) -> Result<Shallow> {
 /// The surface of all layers, and its opacities.
 fn layered(liquid: &Shallow, ground: &TriMesh) -> Result<(TriMesh, Vec<f32>)> {
     let columns = liquid.columns();
-    let mut lifts = Lifts::default();
+    let mut lifts = MinimumHeights::default();
     lifts.find(columns, &ground.positions, &ground.triangles, Distance::default())?;
     let depths =
         Depths { depth: liquid.depths(), least: lifts.least(), sunk: lifts.sunk(), ..Depths::default() };

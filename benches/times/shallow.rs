@@ -5,7 +5,7 @@ use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::{Section, TimeStepping};
 use frazil::shallow::pipes::Border;
-use frazil::shallow::surface::heights::minimum_heights::{Distance, Lifts};
+use frazil::shallow::surface::heights::minimum_heights::{Distance, MinimumHeights};
 use frazil::shallow::surface::rim::ledges::Ledges;
 use frazil::shallow::surface::rim::silhouette::Silhouette;
 use frazil::shallow::terrain::Solids;
@@ -219,7 +219,7 @@ fn fitting() {
     for edge in [100, 200, 300] {
         let rough = rough(39, Kind { edge, ..Kind::of(39) });
         let (columns, positions, faces) = (&rough.columns, &rough.positions, &rough.faces);
-        let (mut lifts, distance) = (Lifts::default(), Distance::default());
+        let (mut lifts, distance) = (MinimumHeights::default(), Distance::default());
         let (mut ledges, mut silhouette) = (Ledges::default(), Silhouette::default());
         let near = [edge / 2 - 20..edge / 2 + 20, edge / 2 - 20..edge / 2 + 20];
         let mut times = [f64::MAX; 3];

@@ -7,7 +7,7 @@ use frazil::shallow::Shallow;
 use frazil::shallow::columns::{Columns, NONE};
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Params;
-use frazil::shallow::surface::heights::minimum_heights::{Distance, Fitted, Lifts};
+use frazil::shallow::surface::heights::minimum_heights::{Distance, Fitted, MinimumHeights};
 use frazil::shallow::surface::{Depths, Indices, Layout, Surface, Target, bound};
 
 use crate::common::bodies::Dice;
@@ -37,7 +37,7 @@ struct Mesh {
 /// Ground, and what is known of it.
 struct Ground {
     rough: Rough,
-    lifts: Lifts,
+    lifts: MinimumHeights,
     fitted: Fitted,
     surface: Surface,
     /// Triangles over each cell, in cells from the centre of cell (0, 0).
@@ -67,7 +67,7 @@ fn height_at(corners: [[f64; 3]; 3], at: [f64; 2]) -> Option<f64> {
 impl Ground {
     fn new(seed: u64, kind: Kind) -> Self {
         let rough = rough(seed, kind);
-        let mut lifts = Lifts::default();
+        let mut lifts = MinimumHeights::default();
         let fitted = lifts
             .find(&rough.columns, &rough.positions, &rough.faces, Distance::default())
             .expect("minimum heights");
@@ -190,7 +190,7 @@ impl Above {
             face.iter().for_each(|&corner| up[corner as usize] += b.z * c.x - b.x * c.z);
         }
         let triangles = mesh.by_quartet();
-        let bare = ground.lifts.bare();
+        let bare = ground.lifts.uncovered();
         for (vertex, at) in positions.iter().enumerate().filter(|(vertex, _)| up[*vertex] > 0.0) {
             if bare.binary_search(&(vertex as u32)).is_ok() {
                 continue;

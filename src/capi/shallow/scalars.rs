@@ -7,13 +7,13 @@ use super::read::Requested;
 use super::spill::frz_shallow;
 use crate::capi::ffi::*;
 use crate::error::Result;
-use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::{Law, Scalar, ScalarBalance};
 
 /// Maximum number of scalars that a liquid carries.
 pub const FRZ_SHALLOW_MOST_SCALARS: u32 = 4;
 
-const _: () = assert!(FRZ_SHALLOW_MOST_SCALARS as usize == MOST);
+const _: () = assert!(FRZ_SHALLOW_MOST_SCALARS as usize == MAX_SCALARS);
 
 /// How a scalar changes, besides being carried.
 #[repr(u32)]
@@ -79,7 +79,7 @@ pub(in crate::capi) unsafe fn read_scalars(
     scalars: *const frz_shallow_scalar,
     count: usize,
 ) -> Outcome<Vec<Scalar>> {
-    refuse(count > MOST, || format!("{count} scalars are more than {MOST}"))?;
+    refuse(count > MAX_SCALARS, || format!("{count} scalars are more than {MAX_SCALARS}"))?;
     let mut given = Vec::new();
     // SAFETY: guaranteed by the caller.
     let scalar = |scalar: frz_shallow_scalar| unsafe { scalar.scalar() };
@@ -156,7 +156,7 @@ pub(in crate::capi) unsafe fn with_concentrations(
     // SAFETY: guaranteed by the caller.
     let given =
         unsafe { one_for_each::<f64>(concentrations, "concentrations", count, ["there are", "scalars"]) }?;
-    let mut numbers = [0.0; MOST];
+    let mut numbers = [0.0; MAX_SCALARS];
     numbers.iter_mut().zip(given).for_each(|(number, given)| *number = given);
     Ok(set(&numbers[..count])?)
 }

@@ -11,8 +11,8 @@ use super::waiting::{Waiting, add, outward};
 use crate::shallow::columns::{Columns, NONE};
 use crate::shallow::pipes::cliffs::beside;
 use crate::shallow::pipes::side::Side;
-use crate::shallow::scalars::amounts::{Account, Act};
-use crate::shallow::scalars::shares::{MOST, integer, take};
+use crate::shallow::scalars::amounts::{Account, LawEffect};
+use crate::shallow::scalars::shares::{MAX_SCALARS, integer, take};
 use crate::shallow::solver::Flow;
 use crate::shallow::solver::overflow_edges::Over;
 use crate::shallow::system::Shallow;
@@ -48,10 +48,10 @@ impl Shallow {
 
     /// Applies the laws of scalars to liquid in the air.
     fn obey_in_the_air(&mut self) {
-        for (scalar, act) in self.flow.amounts.acts().iter().enumerate() {
-            if *act != Act::default() {
+        for (scalar, effect) in self.flow.amounts.law_effects().iter().enumerate() {
+            if *effect != LawEffect::default() {
                 let loads = self.falls.loads();
-                let grown = loads.map(|(units, amounts)| act.change(units, &mut amounts[scalar])).sum();
+                let grown = loads.map(|(units, amounts)| effect.change(units, &mut amounts[scalar])).sum();
                 self.flow.amounts.grow(scalar, grown);
             }
         }
@@ -61,7 +61,7 @@ impl Shallow {
     fn fly(&mut self, dt: f64) {
         let mut packets = std::mem::take(&mut self.falls.packets);
         let mut landed = std::mem::take(&mut self.falls.landed);
-        let (air, mut lost, mut gone) = (self.air(), 0, [0; MOST]);
+        let (air, mut lost, mut gone) = (self.air(), 0, [0; MAX_SCALARS]);
         packets.retain_mut(|packet| {
             let end = air.fly(packet, dt);
             match end {
@@ -110,7 +110,7 @@ impl Shallow {
     fn land(&mut self, Landing { column, units, mut amounts }: Landing) -> bool {
         let (columns, flow, column) = (&self.columns, &mut self.flow, column as usize);
         let added = flow.change_depth(columns, column, units);
-        let mut own = [0; MOST];
+        let mut own = [0; MAX_SCALARS];
         take(&mut amounts, added, units, &mut own);
         flow.amounts.put(column, &own);
         let cell = columns.grid.index(columns.cell(column));

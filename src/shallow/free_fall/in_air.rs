@@ -9,7 +9,7 @@ use super::rivulets::Rivulets;
 use super::splash::Landing;
 use super::waiting::Waiting;
 use crate::numeric::lists::refill;
-use crate::shallow::scalars::shares::MOST;
+use crate::shallow::scalars::shares::MAX_SCALARS;
 
 /// Capacity of the list of landings: this many columns for each packet.
 pub(super) const SPLASHES: usize = 4;
@@ -69,11 +69,11 @@ impl Falling {
 
     /// Clears all amounts, because the scalars have changed.
     pub fn forget_amounts(&mut self) {
-        self.loads().for_each(|(_, amounts)| *amounts = [0; MOST]);
+        self.loads().for_each(|(_, amounts)| *amounts = [0; MAX_SCALARS]);
     }
 
     /// Units and amounts of each packet, and of the liquid that waits at each link.
-    pub fn loads(&mut self) -> impl Iterator<Item = (i64, &mut [i64; MOST])> {
+    pub fn loads(&mut self) -> impl Iterator<Item = (i64, &mut [i64; MAX_SCALARS])> {
         let packets = self.packets.iter_mut().map(|packet| (packet.units, &mut packet.amounts));
         packets.chain(self.waiting.iter_mut().map(|waiting| (waiting.units, &mut waiting.amounts)))
     }

@@ -24,7 +24,7 @@ mod rivulets;
 mod splash;
 mod waiting;
 
-use super::scalars::MOST;
+use super::scalars::MAX_SCALARS;
 use super::scalars::shares::LEVELS;
 use super::system::Shallow;
 pub(super) use crate::shallow::free_fall::in_air::Falling;
@@ -48,7 +48,7 @@ pub struct Droplet {
     /// Its overflow edge: the same number for all drops from one side of one column.
     pub source: u64,
     /// Concentration of each scalar, in the scalar's own measure.
-    pub concentrations: [f32; MOST],
+    pub concentrations: [f32; MAX_SCALARS],
     /// Where the liquid leaves the ground; only for the newest drop there.
     pub lip: Option<OverflowEdge>,
     /// One more than the number of the previous drop of the same overflow edge, unless the flow there was interrupted.
@@ -73,7 +73,7 @@ impl Shallow {
         let unit = grid.cell * grid.cell * heights.unit;
         let scalars = self.scalars();
         self.falls.packets.iter().map(move |packet| {
-            let mut concentrations = [0.0; MOST];
+            let mut concentrations = [0.0; MAX_SCALARS];
             for ((out, scalar), amount) in concentrations.iter_mut().zip(scalars).zip(packet.amounts) {
                 *out = (amount as f64 / packet.units as f64 * (scalar.range / LEVELS)) as f32;
             }

@@ -2,7 +2,7 @@
 
 use crate::shallow::columns::Columns;
 use crate::shallow::columns::grid::TOP;
-use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::MAX_SCALARS;
 
 /// Bytes of a packet in a saved state.
 pub(in crate::shallow) const PACKET: usize = 88;
@@ -24,7 +24,7 @@ pub(in crate::shallow) struct Packet {
     pub age: f64,
     /// Volume (units), above 0, and amount of each scalar; saved states store the amounts separately.
     pub units: i64,
-    pub amounts: [i64; MOST],
+    pub amounts: [i64; MAX_SCALARS],
     /// Its origin: the cell (`Grid::index`), its side and its layer.
     pub source: u64,
     /// When it was created: how many times packets had been created since the start.
@@ -59,7 +59,7 @@ impl Packet {
             along: [east, south],
             age,
             units,
-            amounts: [0; MOST],
+            amounts: [0; MAX_SCALARS],
             source,
             tick,
         }
@@ -93,7 +93,7 @@ mod tests {
             along: [-3.0, 0.125],
             age: 0.75,
             units: 1 << 40,
-            amounts: [0; MOST],
+            amounts: [0; MAX_SCALARS],
             source: 99 << 18,
             tick: 5,
         };

@@ -6,7 +6,7 @@
 
 use super::waiting::add;
 use crate::shallow::columns::Columns;
-use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::scalars::shares::part;
 
 /// Maximum radius of the spread (cells).
@@ -17,7 +17,7 @@ const FURTHEST: i32 = 3;
 pub(super) struct Landing {
     pub column: u32,
     pub units: i64,
-    pub amounts: [i64; MOST],
+    pub amounts: [i64; MAX_SCALARS],
 }
 
 /// Adds up the landings on each column, so that the result does not depend on an order; sorts by column.
@@ -108,11 +108,11 @@ mod tests {
             let column = columns.column([x, 9], 0).unwrap() as u32;
             let units = (volume / (1e-6 * heights.unit)) as i64;
             let mut landed = Vec::with_capacity(200);
-            landed.push(Landing { column, units, amounts: [7 * units; MOST] });
+            landed.push(Landing { column, units, amounts: [7 * units; MAX_SCALARS] });
             spread(&columns, &mut landed, 200);
             merge(&mut landed);
             assert_eq!(landed.iter().map(|landing| landing.units).sum::<i64>(), units);
-            assert!(landed.iter().all(|landing| landing.amounts == [7 * landing.units; MOST]));
+            assert!(landed.iter().all(|landing| landing.amounts == [7 * landing.units; MAX_SCALARS]));
             assert!(landed.iter().all(|landing| columns.cell(landing.column as usize)[0] < 10) == (x < 10));
             landed.len()
         };
@@ -124,7 +124,7 @@ mod tests {
         landed.push(Landing {
             column: columns.column([5, 5], 0).unwrap() as u32,
             units: 1 << 29,
-            amounts: [0; MOST],
+            amounts: [0; MAX_SCALARS],
         });
         spread(&columns, &mut landed, 4);
         assert_eq!((landed.len(), landed[0].units), (1, 1 << 29));

@@ -3,7 +3,7 @@
 use crate::shallow::columns::{Columns, NONE};
 use crate::shallow::pipes::Links;
 use crate::shallow::pipes::side::Side;
-use crate::shallow::scalars::shares::MOST;
+use crate::shallow::scalars::shares::MAX_SCALARS;
 
 /// Bytes of an overflow edge in a saved state.
 pub(in crate::shallow) const LIP: usize = 40;
@@ -19,7 +19,7 @@ const DRIPS: i64 = 8;
 pub(in crate::shallow) struct Waiting {
     /// Volume (units), 0 and up, and amount of each scalar; saved states store the amounts separately.
     pub units: i64,
-    pub amounts: [i64; MOST],
+    pub amounts: [i64; MAX_SCALARS],
     /// Outward speed (cells/s), times units.
     pub impulse: f64,
     /// Direction of the last fall: from the link's second column.
@@ -52,7 +52,7 @@ impl Waiting {
             std::array::from_fn(|at| u64::from_le_bytes(bytes.as_chunks().0[at]));
         Self {
             units: units as i64,
-            amounts: [0; MOST],
+            amounts: [0; MAX_SCALARS],
             impulse: f64::from_bits(impulse),
             is_back: last >> 32 & 1 != 0,
             waits: last as u32,
@@ -99,7 +99,7 @@ impl Waiting {
 }
 
 /// Adds amounts to others.
-pub(super) fn add(to: &mut [i64; MOST], amounts: &[i64; MOST]) {
+pub(super) fn add(to: &mut [i64; MAX_SCALARS], amounts: &[i64; MAX_SCALARS]) {
     to.iter_mut().zip(amounts).for_each(|(to, amount)| *to = to.saturating_add(*amount));
 }
 

@@ -9,7 +9,7 @@ use crate::numeric::lists::{refill, reset};
 use crate::shallow::columns::runs::{fill_runs, runs};
 use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::free_fall::Droplet;
-use crate::shallow::scalars::{MOST, find_concentrations};
+use crate::shallow::scalars::{MAX_SCALARS, find_concentrations};
 use crate::shallow::solver::Flow;
 use crate::shallow::system::Shallow;
 
@@ -26,7 +26,7 @@ pub struct Snapshot {
     active: Vec<bool>,
     drops: Vec<Droplet>,
     /// One per scalar; empty for those that do not exist.
-    concentrations: [Vec<f32>; MOST],
+    concentrations: [Vec<f32>; MAX_SCALARS],
     time: f64,
 }
 

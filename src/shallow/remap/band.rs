@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::numeric::lists::refill;
 use crate::shallow::columns::{Columns, STRIP, Strip};
-use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::solver::Flow;
 
 /// The columns of some rows and their liquid. Strips and indices are counted from the first of these rows.
@@ -28,7 +28,7 @@ pub(super) struct Band {
     /// Heads above the surface.
     pub over: Vec<f32>,
     /// Amounts of scalars; empty without them.
-    pub amounts: [Vec<f64>; MOST],
+    pub amounts: [Vec<f64>; MAX_SCALARS],
 }
 
 impl Band {

@@ -6,7 +6,7 @@
 
 use crate::numeric::lists::refill;
 use crate::shallow::columns::grid::BOTTOMLESS;
-use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::scalars::shares::take;
 
 /// No column.
@@ -20,7 +20,7 @@ pub(super) struct Old {
     pub index: u32,
     pub base: i32,
     pub depth: i32,
-    pub amounts: [i64; MOST],
+    pub amounts: [i64; MAX_SCALARS],
 }
 
 /// A column after the change.
@@ -34,7 +34,7 @@ pub(super) struct New {
     /// Index of the column that it was before, or `u32::MAX`.
     pub from: u32,
     /// Amounts of scalars that it receives.
-    pub amounts: [i64; MOST],
+    pub amounts: [i64; MAX_SCALARS],
 }
 
 /// Liquid that must find a column.
@@ -45,7 +45,7 @@ struct Parcel {
     /// The height at which it stood.
     height: i32,
     units: i64,
-    amounts: [i64; MOST],
+    amounts: [i64; MAX_SCALARS],
 }
 
 /// The columns of one cell, from the lowest up.
@@ -70,7 +70,7 @@ pub(super) struct Rest {
     /// Units that did not stay in their columns, including those that found another one.
     pub displaced: i64,
     /// Amounts of scalars of the units.
-    pub amounts: [i64; MOST],
+    pub amounts: [i64; MAX_SCALARS],
 }
 
 impl Default for Cell {
@@ -183,7 +183,7 @@ impl Cell {
 
 /// A new column without liquid.
 pub(super) fn dry(index: usize, base: i32, ceiling: i32) -> New {
-    New { index: index as u32, base, ceiling, depth: 0, from: NO, amounts: [0; MOST] }
+    New { index: index as u32, base, ceiling, depth: 0, from: NO, amounts: [0; MAX_SCALARS] }
 }
 
 #[cfg(test)]
@@ -198,7 +198,7 @@ mod tests {
             index: index as u32,
             base,
             depth,
-            amounts: [0; MOST],
+            amounts: [0; MAX_SCALARS],
         };
         cell.old = old.iter().enumerate().map(column).collect();
         cell.new = new.iter().enumerate().map(|(index, ends)| dry(index, ends[0], ends[1])).collect();
@@ -236,7 +236,7 @@ mod tests {
         assert_eq!(rest, Rest { units: 100, displaced: 100, ..Rest::default() });
         assert_eq!(
             remap(&[(7, 50)], &[]).1,
-            Rest { units: 50, height: 7, displaced: 50, amounts: [0; MOST] }
+            Rest { units: 50, height: 7, displaced: 50, amounts: [0; MAX_SCALARS] }
         );
     }
 
@@ -249,7 +249,7 @@ mod tests {
         ];
         // Thirty units stay, seventy are pushed up into the former upper column.
         cell.new = vec![dry(0, 0, 30), dry(1, 500, TOP)];
-        assert_eq!(cell.remap().amounts, [0; MOST]);
+        assert_eq!(cell.remap().amounts, [0; MAX_SCALARS]);
         assert_eq!(cell.new[0].amounts, [300, -15, 2, 0]);
         assert_eq!(cell.new[1].amounts, [710, -35, 5, 1 << 40]);
     }
@@ -257,11 +257,11 @@ mod tests {
     #[test]
     fn liquid_below_a_solid_that_hangs_does_not_get_on_top_of_it() {
         let mut cell = Cell { under: 100, reach: 10, ..Cell::default() };
-        let old = |index, base| Old { index, base, depth: 5, amounts: [7 + i64::from(base); MOST] };
+        let old = |index, base| Old { index, base, depth: 5, amounts: [7 + i64::from(base); MAX_SCALARS] };
         cell.old = vec![old(0, 20), old(1, 200)];
         cell.new = vec![dry(0, 200, TOP)];
-        assert_eq!(cell.remap(), Rest { units: 5, height: 20, displaced: 5, amounts: [27; MOST] });
-        assert_eq!(cell.new[0].amounts, [207; MOST]);
+        assert_eq!(cell.remap(), Rest { units: 5, height: 20, displaced: 5, amounts: [27; MAX_SCALARS] });
+        assert_eq!(cell.new[0].amounts, [207; MAX_SCALARS]);
         assert_eq!(cell.new[0].depth, 5);
     }
 }

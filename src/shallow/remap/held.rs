@@ -6,7 +6,7 @@ use crate::numeric::lists::refill;
 use crate::shallow::columns::Columns;
 use crate::shallow::columns::grid::BOTTOMLESS;
 use crate::shallow::pipes::side::Side;
-use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::scalars::amounts::Account;
 use crate::shallow::scalars::shares::{part, take};
 use crate::shallow::solver::Flow;
@@ -21,7 +21,7 @@ pub struct Parcel {
     /// Volume (units), above 0.
     pub units: i64,
     /// Amount of each scalar.
-    pub amounts: [i64; MOST],
+    pub amounts: [i64; MAX_SCALARS],
 }
 
 impl Parcel {
@@ -38,7 +38,7 @@ impl Parcel {
     pub(in crate::shallow) fn from_bytes(bytes: &[u8; 16]) -> Self {
         let all = i128::from_le_bytes(*bytes);
         let (cell, height, units) = (all as u32, (all >> 32) as i32, (all >> 64) as i64);
-        Self { cell, height, units, amounts: [0; MOST] }
+        Self { cell, height, units, amounts: [0; MAX_SCALARS] }
     }
 
     /// Whether it is valid over these columns.
@@ -53,7 +53,7 @@ struct Offer {
     cell: u32,
     height: i32,
     units: i64,
-    amounts: [i64; MOST],
+    amounts: [i64; MAX_SCALARS],
     parcel: u32,
 }
 
@@ -82,7 +82,13 @@ impl Held {
     }
 
     /// Adds liquid that finds no room in its cell (`Grid::index`).
-    pub(in crate::shallow) fn add(&mut self, cell: usize, height: i32, units: i64, amounts: [i64; MOST]) {
+    pub(in crate::shallow) fn add(
+        &mut self,
+        cell: usize,
+        height: i32,
+        units: i64,
+        amounts: [i64; MAX_SCALARS],
+    ) {
         if units > 0 {
             self.parcels.push(Parcel { cell: cell as u32, height, units, amounts });
         }
@@ -115,7 +121,7 @@ impl Held {
 
     /// Clears all amounts, because the scalars have changed.
     pub(in crate::shallow) fn forget_amounts(&mut self) {
-        self.parcels.iter_mut().for_each(|parcel| parcel.amounts = [0; MOST]);
+        self.parcels.iter_mut().for_each(|parcel| parcel.amounts = [0; MAX_SCALARS]);
     }
 
     /// The waiting liquid, by cell: part of the state.
@@ -179,7 +185,7 @@ impl Held {
             for cell in Side::ALL.into_iter().filter_map(|side| side.cell(own, grid.size)) {
                 let cell = grid.index(cell) as u32;
                 if room(columns, flow, cell, parcel.height) > 0 {
-                    let (height, amounts) = (parcel.height, [0; MOST]);
+                    let (height, amounts) = (parcel.height, [0; MAX_SCALARS]);
                     self.offers.push(Offer { cell, height, units: 0, amounts, parcel: number as u32 });
                 }
             }
@@ -259,7 +265,7 @@ fn put(columns: &Columns, flow: &mut Flow, order: &mut Vec<u32>, parcel: &mut Pa
         let units = room_of(columns, flow, column).min(parcel.units);
         if units > 0 {
             let units = flow.change_depth(columns, column, units);
-            let mut amounts = [0; MOST];
+            let mut amounts = [0; MAX_SCALARS];
             take(&mut parcel.amounts, units, parcel.units, &mut amounts);
             parcel.units -= units;
             flow.amounts.put(column, &amounts);

@@ -8,7 +8,7 @@ use super::origins::Origins;
 use crate::shallow::columns::grid::{BOTTOMLESS, TOP};
 use crate::shallow::columns::stacks::Stacks;
 use crate::shallow::columns::{Columns, NONE, STRIP, Strip, strip_mut, strip_of};
-use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::terrain::solids::Solid;
 
 /// If a cell has several columns, bases more than this many cells apart are not of the same column.
@@ -40,7 +40,7 @@ pub(super) struct Liquid<'a> {
     /// H (units).
     pub depth: &'a mut [i32],
     /// Amounts of scalars; empty without them.
-    pub amounts: [&'a mut [f64]; MOST],
+    pub amounts: [&'a mut [f64]; MAX_SCALARS],
 }
 
 impl Layout {

@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::numeric::bytes::Reader;
 use crate::shallow::Shallow;
 use crate::shallow::columns::grid::Cells;
-use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::two_level::rests::Load;
 use crate::shallow::two_level::{Detail, check_near};
 
@@ -159,7 +159,7 @@ impl<'a> Both<'a> {
         let [pipes, rests] = [count()?, count()?];
         let sizes = [u64::from_le_bytes(from.take()?), u64::from_le_bytes(from.take()?)];
         let last = from.f64()?;
-        require(scalars <= MOST, "is damaged")?;
+        require(scalars <= MAX_SCALARS, "is damaged")?;
         let fixed = (HEADER + rest_bytes(scalars) * rests + 8 * pipes + SEAL) as u64;
         let all = sizes[0].checked_add(sizes[1]).and_then(|sum| sum.checked_add(fixed));
         require(all == Some(bytes.len() as u64), "is damaged")?;
@@ -197,7 +197,7 @@ impl<'a> Both<'a> {
     fn rests(&self) -> impl Iterator<Item = (usize, Load)> + Clone {
         let (bytes, scalars) = (rest_bytes(self.scalars), self.scalars);
         self.rests.chunks_exact(bytes).map(move |rest| {
-            let mut amounts = [0; MOST];
+            let mut amounts = [0; MAX_SCALARS];
             for (at, amount) in amounts[..scalars].iter_mut().enumerate() {
                 *amount = i64::from_le_bytes(part(rest, 16 + 8 * at));
             }

@@ -18,7 +18,7 @@ use crate::shallow::columns::runs::runs;
 use crate::shallow::free_fall::{Packet, Waiting};
 use crate::shallow::remap::Parcel;
 use crate::shallow::scalars::amounts::{ACCOUNTS, Amounts};
-use crate::shallow::scalars::shares::{LEVELS, MOST, nearest};
+use crate::shallow::scalars::shares::{LEVELS, MAX_SCALARS, nearest};
 use crate::shallow::scalars::{Law, Scalar};
 use crate::shallow::system::Shallow;
 
@@ -60,13 +60,13 @@ struct Part<'a> {
 /// The parts of all scalars.
 pub(super) struct Scalars<'a> {
     count: usize,
-    parts: [Option<Part<'a>>; MOST],
+    parts: [Option<Part<'a>>; MAX_SCALARS],
 }
 
 impl<'a> Scalars<'a> {
     /// Finds the parts; if there are more scalars than a liquid may have, they are only counted.
     pub(super) fn read(from: &mut Reader<'a>, counts: &Counts) -> Result<Self> {
-        let mut all = [None; MOST];
+        let mut all = [None; MAX_SCALARS];
         for own in all.iter_mut().take(counts.scalars) {
             let head = &parts(from, 1)?[0];
             let parcels = parts(from, counts.parcels)?;
@@ -136,8 +136,8 @@ impl<'a> Scalars<'a> {
         Waiting { amounts: self.amounts(|part| part.lips, at), ..waiting }
     }
 
-    fn amounts(&self, of: impl Fn(&Part<'a>) -> &'a [[u8; 8]], at: usize) -> [i64; MOST] {
-        let mut amounts = [0; MOST];
+    fn amounts(&self, of: impl Fn(&Part<'a>) -> &'a [[u8; 8]], at: usize) -> [i64; MAX_SCALARS] {
+        let mut amounts = [0; MAX_SCALARS];
         for (amount, part) in amounts.iter_mut().zip(self.iter()) {
             *amount = i64::from_le_bytes(of(part)[at]);
         }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::shares::{LEVELS, Levels, MOST, integer, level, share};
+use super::shares::{LEVELS, Levels, MAX_SCALARS, integer, level, share};
 use super::{Law, Scalar};
 use crate::shallow::columns::per_column::{Array, PerColumn};
 
@@ -53,15 +53,15 @@ pub(in crate::shallow) struct Changes {
 
 /// The effect of a law in a step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(in crate::shallow) struct Act {
+pub(in crate::shallow) struct LawEffect {
     /// Levels that each unit gains.
     pub grows: f64,
     /// Part of the amount that is lost.
     pub loses: f64,
 }
 
-impl Act {
-    /// Applies it to the amount of so many units, as `obey` in `solver/transfers/scalars.rs` does to that of a column; returns the growth.
+impl LawEffect {
+    /// Applies it to the amount of so many units, as `apply_law` in `solver/transfers/scalars.rs` does to that of a column; returns the growth.
     pub fn change(&self, units: i64, amount: &mut i64) -> i128 {
         let (units, before) = (i128::from(units), i128::from(*amount));
         let kept = before - (*amount as f64 * self.loses).round_ties_even() as i128;
@@ -78,13 +78,13 @@ impl Act {
 pub(in crate::shallow) struct Amounts {
     pub scalars: Vec<Scalar>,
     /// For each scalar, by column index, padded by a strip; empty for absent scalars. 0 where there is no liquid.
-    pub amounts: [PerColumn<f64>; MOST],
+    pub amounts: [PerColumn<f64>; MAX_SCALARS],
     /// By scalar and account.
-    pub sums: [[i128; ACCOUNTS]; MOST],
+    pub sums: [[i128; ACCOUNTS]; MAX_SCALARS],
     /// Pending effect of each law, too small to be applied: levels, or seconds.
-    pub due: [f64; MOST],
+    pub due: [f64; MAX_SCALARS],
     /// The effects of the laws in this step.
-    acts: [Act; MOST],
+    law_effects: [LawEffect; MAX_SCALARS],
     /// Concentrations of poured liquid.
     pub poured: Levels,
     /// Levels of the parties of a flooded network; kept to avoid repeated allocation.
@@ -107,10 +107,10 @@ impl Amounts {
                 PerColumn::new(positions[at], if at < count { len } else { 0 }, 0.0)
             }),
             scalars,
-            sums: [[0; ACCOUNTS]; MOST],
-            due: [0.0; MOST],
-            acts: [Act::default(); MOST],
-            poured: [0; MOST],
+            sums: [[0; ACCOUNTS]; MAX_SCALARS],
+            due: [0.0; MAX_SCALARS],
+            law_effects: [LawEffect::default(); MAX_SCALARS],
+            poured: [0; MAX_SCALARS],
             party_levels: Vec::with_capacity(if count > 0 { PARTIES } else { 0 }),
         }
     }
@@ -138,25 +138,25 @@ impl Amounts {
     }
 
     /// The effects of the laws in this step, by scalar.
-    pub fn acts(&self) -> [Act; MOST] {
-        self.acts
+    pub fn law_effects(&self) -> [LawEffect; MAX_SCALARS] {
+        self.law_effects
     }
 
     /// Begins a step of `dt` (s).
     pub fn begin_step(&mut self, dt: f64) {
-        for ((scalar, act), due) in self.scalars.iter().zip(&mut self.acts).zip(&mut self.due) {
-            *act = Act::default();
+        for ((scalar, effect), due) in self.scalars.iter().zip(&mut self.law_effects).zip(&mut self.due) {
+            *effect = LawEffect::default();
             match scalar.law {
                 Law::Dye => {}
                 Law::Ages => {
                     *due += dt * (LEVELS / scalar.range);
-                    act.grows = due.floor();
-                    *due -= act.grows;
+                    effect.grows = due.floor();
+                    *due -= effect.grows;
                 }
                 Law::Decays(half) => {
                     *due += dt;
                     if *due >= half * DECAY {
-                        act.loses = -libm::expm1(-*due / half * std::f64::consts::LN_2);
+                        effect.loses = -libm::expm1(-*due / half * std::f64::consts::LN_2);
                         *due = 0.0;
                     }
                 }
@@ -165,7 +165,7 @@ impl Amounts {
     }
 
     /// Ends a step that has changed amounts on some rows.
-    pub fn settle(&mut self, changes: &[Changes; MOST]) {
+    pub fn settle(&mut self, changes: &[Changes; MAX_SCALARS]) {
         for (sums, changes) in self.sums.iter_mut().zip(changes) {
             sums[Account::Lost as usize] += changes.lost;
             sums[Account::Gained as usize] += changes.gained;
@@ -191,7 +191,7 @@ impl Amounts {
     }
 
     /// Adds amounts to a column, for liquid that has already been added.
-    pub fn put(&mut self, index: usize, amounts: &[i64; MOST]) {
+    pub fn put(&mut self, index: usize, amounts: &[i64; MAX_SCALARS]) {
         for (at, amount) in amounts.iter().enumerate().take(self.count()) {
             self.amounts[at][index] += *amount as f64;
         }
@@ -203,7 +203,7 @@ impl Amounts {
     }
 
     /// Adds amounts to an account.
-    pub fn count_in(&mut self, account: Account, amounts: &[i64; MOST]) {
+    pub fn count_in(&mut self, account: Account, amounts: &[i64; MAX_SCALARS]) {
         for (sums, amount) in self.sums.iter_mut().zip(amounts) {
             sums[account as usize] += i128::from(*amount);
         }

@@ -18,7 +18,7 @@ use crate::numeric::cpu::dispatch;
 use amounts::{ACCOUNTS, Account, Amounts};
 pub(super) use law::check_scalar;
 pub use law::{Law, Scalar};
-pub use shares::MOST;
+pub use shares::MAX_SCALARS;
 use shares::{LEVELS, Levels};
 
 /// Where all of a scalar is: concentration x volume (its own measure x m3).
@@ -55,9 +55,12 @@ impl Shallow {
     /// poured liquid and of sources, until [`Shallow::set_poured`] and [`Shallow::set_sourced`]. Frames allocate nothing for scalars.
     ///
     /// # Errors
-    /// `Argument`: more than [`MOST`] scalars; one that [`Scalar::validate`] refuses; two of the same name.
+    /// `Argument`: more than [`MAX_SCALARS`] scalars; one that [`Scalar::validate`] refuses; two of the same name.
     pub fn set_scalars(&mut self, scalars: &[Scalar]) -> Result<()> {
-        ensure(scalars.len() <= MOST, format_args!("{} scalars are more than {MOST}", scalars.len()))?;
+        ensure(
+            scalars.len() <= MAX_SCALARS,
+            format_args!("{} scalars are more than {MAX_SCALARS}", scalars.len()),
+        )?;
         for (at, scalar) in scalars.iter().enumerate() {
             scalar.validate().map_err(|error| Error::argument(format!("scalar {at}: {error}")))?;
             if scalars[..at].iter().any(|other| other.name == scalar.name) {
@@ -98,7 +101,7 @@ impl Shallow {
     fn levels(&self, concentrations: &[f64]) -> Result<Levels> {
         let scalars = self.scalars();
         check_each(concentrations.len(), "concentrations", scalars.len(), "scalars")?;
-        let mut levels = [0; MOST];
+        let mut levels = [0; MAX_SCALARS];
         for ((level, scalar), concentration) in levels.iter_mut().zip(scalars).zip(concentrations) {
             *level = scalar.level(*concentration)?;
         }

@@ -4,13 +4,13 @@
 //! as an f64, which is exact for integers up to 2^53, and for which all processors have vector instructions.
 
 /// Maximum count of scalars that a liquid carries.
-pub const MOST: usize = 4;
+pub const MAX_SCALARS: usize = 4;
 
 /// Levels in the range of a scalar.
 pub const LEVELS: f64 = (1 << 20) as f64;
 
 /// Concentrations of all scalars, in levels.
-pub(in crate::shallow) type Levels = [i32; MOST];
+pub(in crate::shallow) type Levels = [i32; MAX_SCALARS];
 
 /// Adding this to a number below 2^51 leaves no bits for a fraction: the sum is rounded to the nearest integer, ties to even.
 const ROUND: f64 = 1.5 * (1u64 << 52) as f64;
@@ -41,12 +41,17 @@ pub(in crate::shallow) fn share(level: f64, units: f64) -> f64 {
 }
 
 /// The part of amounts that belongs to `units` out of `all`, rounded toward 0.
-pub(in crate::shallow) fn part(amounts: &[i64; MOST], units: i64, all: i64) -> [i64; MOST] {
+pub(in crate::shallow) fn part(amounts: &[i64; MAX_SCALARS], units: i64, all: i64) -> [i64; MAX_SCALARS] {
     amounts.map(|amount| (i128::from(amount) * i128::from(units) / i128::from(all.max(1))) as i64)
 }
 
 /// Moves the part of amounts that belongs to `units` out of `all` to others.
-pub(in crate::shallow) fn take(from: &mut [i64; MOST], units: i64, all: i64, to: &mut [i64; MOST]) {
+pub(in crate::shallow) fn take(
+    from: &mut [i64; MAX_SCALARS],
+    units: i64,
+    all: i64,
+    to: &mut [i64; MAX_SCALARS],
+) {
     let part = part(from, units, all);
     for ((from, to), part) in from.iter_mut().zip(to).zip(part) {
         *from -= part;
@@ -82,10 +87,10 @@ mod tests {
 
     #[test]
     fn parts_add_up() {
-        let (mut from, mut to) = ([1001, -7, 0, i64::MAX], [0; MOST]);
+        let (mut from, mut to) = ([1001, -7, 0, i64::MAX], [0; MAX_SCALARS]);
         for all in (1..=9).rev() {
             take(&mut from, 1, all, &mut to);
         }
-        assert_eq!((from, to), ([0; MOST], [1001, -7, 0, i64::MAX]));
+        assert_eq!((from, to), ([0; MAX_SCALARS], [1001, -7, 0, i64::MAX]));
     }
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::shallow::columns::Columns;
 use crate::shallow::pipes::Links;
-use crate::shallow::scalars::MOST as SCALARS;
+use crate::shallow::scalars::MAX_SCALARS;
 
 /// The flow through each link.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -17,7 +17,7 @@ pub struct LinkFlow {
     /// Transfer in this step (units).
     pub transfer: Vec<f32>,
     /// Amounts of each scalar that fell freely over each link in the last step.
-    pub fallen: [Vec<f64>; SCALARS],
+    pub fallen: [Vec<f64>; MAX_SCALARS],
     /// Units that have left the domain so far.
     pub lost: i64,
     /// Units that have entered over an absorbing border.

@@ -28,7 +28,7 @@ use super::columns::{Columns, NONE, STRIP, strip_mut};
 use super::pipes::cliffs::Cliffs;
 use super::pipes::{Links, Pipes};
 use super::scalars::amounts::{Account, Amounts, Changes};
-use super::scalars::shares::{Levels, MOST};
+use super::scalars::shares::{Levels, MAX_SCALARS};
 use crate::shallow::columns::runs::runs;
 pub(super) use crate::shallow::solver::full::SLACK;
 use crate::shallow::solver::link_flow::LinkFlow;
@@ -329,7 +329,7 @@ impl Flow {
         if !self.network.is_empty() {
             self.carry_flooded();
         }
-        let acts = self.amounts.acts();
+        let law_effects = self.amounts.law_effects();
         let ground = Ground {
             columns,
             pipes,
@@ -341,7 +341,7 @@ impl Flow {
             may_rest: step.level > 0,
             may_fill: &[],
             room: &[],
-            acts: &acts,
+            law_effects: &law_effects,
         };
         let [flux, left] =
             [&mut self.flux, &mut self.left].map(|both| both.each_mut().map(|numbers| &mut numbers[..]));
@@ -385,7 +385,7 @@ impl Flow {
     /// Moves the scalars of transfers between full columns.
     fn carry_flooded(&mut self) {
         let Amounts { amounts, party_levels, scalars, .. } = &mut self.amounts;
-        let mut changes = [Changes::default(); MOST];
+        let mut changes = [Changes::default(); MAX_SCALARS];
         let each = amounts.iter_mut().zip(&mut self.links.fallen).zip(&mut changes);
         for ((amounts, fallen), changes) in each.take(scalars.len()) {
             self.network.carry(&self.depth, (&self.overflow_edges, fallen), amounts, party_levels, changes);

@@ -8,7 +8,7 @@ mod pour;
 
 use super::columns::Columns;
 use super::scalars::amounts::Account;
-use super::scalars::shares::{Levels, MOST};
+use super::scalars::shares::{Levels, MAX_SCALARS};
 use super::solver::Flow;
 use crate::error::{Error, Result};
 use crate::numeric::checks::{check_within, ensure};
@@ -242,7 +242,7 @@ impl Flows {
 
     /// What enters through sources carries nothing from now on.
     pub(super) fn forget_levels(&mut self) {
-        self.placed.iter_mut().for_each(|placed| placed.levels = [0; MOST]);
+        self.placed.iter_mut().for_each(|placed| placed.levels = [0; MAX_SCALARS]);
     }
 
     /// Finds the columns of all points again, after the terrain has moved. A point without one rests until it has one.
@@ -289,7 +289,7 @@ fn placed(columns: &Columns, points: &[FlowPoint], which: &impl Fn(usize) -> Str
         point.validate().map_err(|error| Error::argument(format!("{}: {error}", which(at))))?;
         let mut found = Vec::new();
         point.find_columns(columns, &mut found);
-        Ok(Placed { point: point.clone(), columns: found, waiting: 0.0, moved: 0, levels: [0; MOST] })
+        Ok(Placed { point: point.clone(), columns: found, waiting: 0.0, moved: 0, levels: [0; MAX_SCALARS] })
     };
     points.iter().enumerate().map(position).collect()
 }

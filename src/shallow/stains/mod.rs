@@ -10,7 +10,7 @@ mod wet;
 
 use xxhash_rust::xxh3::xxh3_128;
 
-use super::scalars::MOST;
+use super::scalars::MAX_SCALARS;
 use super::scalars::amounts::Account;
 use super::system::Shallow;
 use crate::error::{Error, Result};
@@ -184,7 +184,8 @@ impl Stains {
                 let asked = (room as f64 * dry).round_ties_even().min(room as f64) as i64;
                 if asked > 0 {
                     let flow = &mut liquid.flow;
-                    let taken = -flow.add(&liquid.columns, column, -asked, &[0; MOST], Account::Absorbed);
+                    let taken =
+                        -flow.add(&liquid.columns, column, -asked, &[0; MAX_SCALARS], Account::Absorbed);
                     *held += taken;
                     absorbed += taken;
                 }

@@ -4,7 +4,7 @@ use super::counts::Counts;
 use super::rim::ledges::Ledges;
 use crate::error::{Error, Result};
 use crate::numeric::checks::{check_not_negative, ensure};
-use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::MAX_SCALARS;
 
 /// The liquid in columns.
 #[derive(Debug, Clone, Copy, Default)]
@@ -16,13 +16,13 @@ pub struct Depths<'a> {
     /// Whether each strip may have a wet column; if absent, all strips are searched.
     pub active: Option<&'a [bool]>,
     /// Minimum depth at which each index is shown where it is wet (units), at most from base to ceiling; replaces [`Layout::least_depth`].
-    /// May be empty. See [`Lifts`](super::heights::minimum_heights::Lifts).
+    /// May be empty. See [`MinimumHeights`](super::heights::minimum_heights::MinimumHeights).
     pub least: &'a [i32],
     /// How far below its base each index is shown where it is dry (units), at most down to the underside of its solid; replaces
     /// [`Layout::least_depth`]. May be empty.
     pub sunk: &'a [i32],
     /// One number per index for each array of [`Target::carried`]: concentrations of scalars. May be empty.
-    pub carried: [&'a [f32]; MOST],
+    pub carried: [&'a [f32]; MAX_SCALARS],
     /// Where the surface ends above nothing and is extended down to the ground's edge; if absent, it ends in the middle of the last cell.
     pub ledges: Option<&'a Ledges>,
 }
@@ -110,7 +110,7 @@ pub struct Target<'a> {
     /// Three numbers per vertex (m/s x scale): velocity at the surface, 1.5 times the mean (Eq. 4.4); the upward component is 0.
     pub velocities: Option<&'a mut [f32]>,
     /// One number per vertex for each array of [`Depths::carried`]; for a dry vertex or an extra, the mean of the wet columns around.
-    pub carried: [Option<&'a mut [f32]>; MOST],
+    pub carried: [Option<&'a mut [f32]>; MAX_SCALARS],
     /// Layer of each vertex's column; for an extra, the lowest layer of the wet columns around whose surface ends there.
     pub layers: Option<&'a mut [u32]>,
     /// Index of each vertex's column; [`NONE`](crate::shallow::columns::NONE) for an extra.

@@ -3,7 +3,7 @@
 use super::FINE;
 use crate::numeric::lists::reset;
 use crate::shallow::Shallow;
-use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::scalars::amounts::Account;
 use crate::shallow::scalars::shares::{integer, part};
 
@@ -11,7 +11,7 @@ use crate::shallow::scalars::shares::{integer, part};
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(in crate::shallow) struct Load {
     pub units: i64,
-    pub amounts: [i64; MOST],
+    pub amounts: [i64; MAX_SCALARS],
 }
 
 impl Load {
@@ -44,7 +44,7 @@ impl Load {
 pub(in crate::shallow) struct Rests {
     units: Vec<i64>,
     /// Empty where nothing is carried.
-    amounts: Vec<[i64; MOST]>,
+    amounts: Vec<[i64; MAX_SCALARS]>,
 }
 
 impl Rests {
@@ -55,13 +55,13 @@ impl Rests {
 
     /// From now on the liquid carries this many scalars, all 0 so far.
     pub fn carry(&mut self, scalars: usize) {
-        reset(&mut self.amounts, if scalars > 0 { self.units.len() } else { 0 }, [0; MOST]);
+        reset(&mut self.amounts, if scalars > 0 { self.units.len() } else { 0 }, [0; MAX_SCALARS]);
     }
 
     /// Removes everything that waits.
     pub fn clear(&mut self) {
         self.units.fill(0);
-        self.amounts.fill([0; MOST]);
+        self.amounts.fill([0; MAX_SCALARS]);
     }
 
     /// Count of cells.
@@ -114,8 +114,8 @@ impl Rests {
     pub fn whole(&mut self, cell: usize, load: &Load) -> Load {
         let all = self.of(cell).with(load);
         let rest = all.units.rem_euclid(FINE);
-        let mut whole = Load { units: (all.units - rest) / FINE, amounts: [0; MOST] };
-        let mut left = Load { units: rest, amounts: [0; MOST] };
+        let mut whole = Load { units: (all.units - rest) / FINE, amounts: [0; MAX_SCALARS] };
+        let mut left = Load { units: rest, amounts: [0; MAX_SCALARS] };
         if self.has_amounts() {
             let share = if all.units > 0 { part(&all.amounts, rest, all.units) } else { all.amounts };
             for (at, share) in share.into_iter().enumerate() {
@@ -124,7 +124,7 @@ impl Rests {
                 whole.amounts[at] = (all.amounts[at] - left.amounts[at]) / FINE;
             }
             if whole.units == 0 {
-                (left.amounts, whole.amounts) = (all.amounts, [0; MOST]);
+                (left.amounts, whole.amounts) = (all.amounts, [0; MAX_SCALARS]);
             }
         }
         self.set(cell, left);
@@ -156,7 +156,7 @@ pub(super) fn change(liquid: &mut Shallow, column: usize, load: &Load) {
         let off = Load { units: all.units + over, ..all }.part(over);
         flow.amounts.put(column, &off.amounts.map(|amount| -amount));
         remap.held.add(cell, base, over, off.amounts);
-    } else if all.units == 0 && all.amounts != [0; MOST] {
+    } else if all.units == 0 && all.amounts != [0; MAX_SCALARS] {
         flow.amounts.put(column, &all.amounts.map(|amount| -amount));
         flow.amounts.count_in(Account::Dried, &all.amounts);
     }

@@ -11,7 +11,7 @@ use crate::numeric::cpu::dispatch;
 use crate::numeric::lists::{refill, reset};
 use crate::shallow::columns::grid::{Cells, TOP};
 use crate::shallow::columns::{Columns, NONE};
-use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::scalars::shares::level;
 use crate::shallow::solver::fast_films;
 use crate::shallow::solver::viscous_flux::{Kind, Step, by_kind, flux_of, split};
@@ -56,7 +56,7 @@ pub(in crate::shallow) struct Seam {
     takes: [Vec<f64>; 2],
     factors: [Vec<f32>; 2],
     /// For each of these columns, what it takes of each scalar, minus what it gives; empty where nothing is carried.
-    amounts: [Vec<[i64; MOST]>; 2],
+    amounts: [Vec<[i64; MAX_SCALARS]>; 2],
     /// Cell of each coarse column (`Grid::index`).
     cells: Vec<u32>,
     /// Whether a column has a ceiling.
@@ -320,7 +320,7 @@ impl Seam {
         let Self { pipes, positions, columns, amounts, .. } = self;
         let count = fine.flow.amounts.count();
         for (amounts, columns) in amounts.iter_mut().zip(columns) {
-            reset(amounts, if count > 0 { columns.len() } else { 0 }, [0; MOST]);
+            reset(amounts, if count > 0 { columns.len() } else { 0 }, [0; MAX_SCALARS]);
         }
         if count == 0 {
             return;

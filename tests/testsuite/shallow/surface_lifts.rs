@@ -6,7 +6,7 @@ use crate::common::rough_ground::{Kind, rough};
 use frazil::geometry::Vec3;
 use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, TOP};
 use frazil::shallow::columns::{Columns, NONE};
-use frazil::shallow::surface::heights::minimum_heights::{Distance, Fitted, Lifts};
+use frazil::shallow::surface::heights::minimum_heights::{Distance, Fitted, MinimumHeights};
 use frazil::shallow::surface::{Depths, Layout, Surface};
 use frazil::shallow::terrain::Solids;
 
@@ -21,14 +21,14 @@ fn spike(x: f64, height: f64, z: f64, faces_up: bool) -> (Vec<Vec3>, Vec<[u32; 3
     (positions, vec![if faces_up { [0, 1, 2] } else { [0, 2, 1] }])
 }
 
-fn lifts_of(columns: &Columns, x: f64, height: f64, z: f64, distance: Distance) -> (Lifts, Fitted) {
+fn lifts_of(columns: &Columns, x: f64, height: f64, z: f64, distance: Distance) -> (MinimumHeights, Fitted) {
     let (positions, faces) = spike(x, height, z, true);
-    let mut lifts = Lifts::default();
+    let mut lifts = MinimumHeights::default();
     let fitted = lifts.find(columns, &positions, &faces, distance).unwrap();
     (lifts, fitted)
 }
 
-/// Lifts (m) of the cells of a row, of the lowest layer.
+/// Minimum heights (m) of the cells of a row, of the lowest layer.
 fn metres(columns: &Columns, lengths: &[i32], z: usize) -> Vec<f64> {
     let [nx, _] = columns.grid.size;
     let length = |x: usize| lengths[columns.column([x, z], 0).unwrap()];
@@ -83,14 +83,14 @@ fn columns_under_the_least_have_it_and_leave_the_rest_to_the_others() {
 fn vertices_that_face_down_or_need_too_much_lift_nothing() {
     let columns = columns([2, 2], |_, _| vec![ground(1.0)]);
     let (positions, faces) = spike(0.5, 1.2, 0.5, false);
-    let mut lifts = Lifts::default();
+    let mut lifts = MinimumHeights::default();
     assert_eq!(lifts.find(&columns, &positions, &faces, EXACT).unwrap(), Fitted::default());
     assert!(lifts.least().iter().all(|lift| *lift == 0));
     // In the middle of an edge each column takes all of it: a cell and no more.
     for (height, discarded) in [(1.49, 0), (1.51, 1)] {
         let (lifts, fitted) = lifts_of(&columns, 0.5, height, 0.0, EXACT);
         assert_eq!(fitted, Fitted { upward: 1, discarded, capped: 0 }, "{height}");
-        assert_eq!(lifts.bare().len(), discarded);
+        assert_eq!(lifts.uncovered().len(), discarded);
         assert_eq!(lifts.least().iter().any(|lift| *lift > 0), discarded == 0, "{height}");
     }
 }
@@ -111,7 +111,7 @@ fn dry_columns_go_down_for_a_vertex_that_is_lower() {
 }
 
 /// A surface with lifts.
-fn lifted(columns: &Columns, lifts: &Lifts, depth: &[i32], fade: f64) -> Mesh {
+fn lifted(columns: &Columns, lifts: &MinimumHeights, depth: &[i32], fade: f64) -> Mesh {
     let depths = Depths { depth, least: lifts.least(), sunk: lifts.sunk(), ..Depths::default() };
     let layout = Layout { fade_depth: fade, ..Layout::default() };
     build_with(&mut Surface::default(), columns, &depths, &layout)
@@ -134,15 +134,18 @@ fn no_lift_reaches_through_a_ceiling_or_changes_triangles() {
             positions.extend(spike);
         }
         let faces: Vec<[u32; 3]> = (0..400).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
-        let mut lifts = Lifts::default();
+        let mut lifts = MinimumHeights::default();
         let fitted = lifts.find(&columns, &positions, &faces, Distance::default()).unwrap();
-        assert!(fitted.capped > 0 && lifts.bare().len() == fitted.capped + fitted.discarded, "{fitted:?}");
+        assert!(
+            fitted.capped > 0 && lifts.uncovered().len() == fitted.capped + fitted.discarded,
+            "{fitted:?}"
+        );
         let mut depth = vec![0; columns.len()];
         for index in columns.indices() {
             let room = columns.ceilings()[index] - columns.bases()[index];
             depth[index] = [0, 1, units(0.001), units(0.1).min(room), room.min(units(0.5))][dice.below(5)];
         }
-        let plain = self::lifted(&columns, &Lifts::default(), &depth, 0.0);
+        let plain = self::lifted(&columns, &MinimumHeights::default(), &depth, 0.0);
         for fade in [0.0, 0.01] {
             let mesh = self::lifted(&columns, &lifts, &depth, fade);
             assert_eq!((&mesh.triangles, &mesh.columns), (&plain.triangles, &plain.columns));
@@ -192,7 +195,7 @@ fn vertices_of_wet_and_dry_columns_meet() {
 fn lifts_turn_and_mirror_with_the_ground() {
     for seed in 0..6 {
         let ground = rough(3 * seed, Kind { edge: 20, ..Kind::of(3 * seed + 36) });
-        let mut lifts = Lifts::default();
+        let mut lifts = MinimumHeights::default();
         lifts.find(&ground.columns, &ground.positions, &ground.faces, Distance::default()).unwrap();
         let columns = &ground.columns;
         let n = columns.grid.size[0];
@@ -214,7 +217,7 @@ fn lifts_turn_and_mirror_with_the_ground() {
                 ground.positions.iter().map(|at| Vec3::from(position((*at).into()))).collect();
             let face = |[a, b, c]: [u32; 3]| if is_mirror { [a, c, b] } else { [a, b, c] };
             let faces: Vec<[u32; 3]> = ground.faces.iter().map(|corners| face(*corners)).collect();
-            let mut other = Lifts::default();
+            let mut other = MinimumHeights::default();
             other.find(&moved, &positions, &faces, Distance::default()).unwrap();
             for index in columns.indices() {
                 let to = moved.column(cell(columns.cell(index), n), columns.layer(index)).unwrap();
@@ -278,7 +281,7 @@ fn a_box_that_changes_is_as_if_all_were_found_anew() {
         let mut dice = Dice(seed);
         let mut scene = Changing::new(&mut dice);
         let distance = Distance::default();
-        let mut lifts = Lifts::default();
+        let mut lifts = MinimumHeights::default();
         lifts.find(&scene.columns(), &scene.positions, &scene.faces, distance).unwrap();
         for change in 0..12 {
             let cells = [0, 1].map(|axis| {
@@ -295,7 +298,7 @@ fn a_box_that_changes_is_as_if_all_were_found_anew() {
             }
             let columns = scene.columns();
             lifts.update(&columns, &scene.positions, &scene.faces, distance, cells.clone()).unwrap();
-            let mut anew = Lifts::default();
+            let mut anew = MinimumHeights::default();
             anew.find(&columns, &scene.positions, &scene.faces, distance).unwrap();
             assert_eq!(lifts.least(), anew.least(), "seed {seed}, {cells:?}");
             assert_eq!(lifts.sunk(), anew.sunk(), "seed {seed}, {cells:?}");
@@ -308,7 +311,8 @@ fn what_makes_no_sense_is_an_error() {
     let columns = columns([4, 3], |_, _| vec![ground(1.0)]);
     let (positions, faces) = spike(0.5, 1.2, 0.5, true);
     let fails = |positions: &[Vec3], faces: &[[u32; 3]], distance: Distance, message: &str| {
-        let error = Lifts::default().update(&columns, positions, faces, distance, [0..4, 0..3]).unwrap_err();
+        let error =
+            MinimumHeights::default().update(&columns, positions, faces, distance, [0..4, 0..3]).unwrap_err();
         assert_eq!(error.to_string(), message);
     };
     let usual = Distance::default();
@@ -316,7 +320,8 @@ fn what_makes_no_sense_is_an_error() {
     fails(&[Vec3::new(0.0, f32::NAN, 0.0)], &[], usual, "vertex 0 of the terrain is not finite");
     let bad = Distance { margin: -1.0, ..usual };
     fails(&positions, &faces, bad, "a distance of -1 cells is not finite and 0 or more");
-    let error = Lifts::default().update(&columns, &positions, &faces, usual, [0..5, 0..3]).unwrap_err();
+    let error =
+        MinimumHeights::default().update(&columns, &positions, &faces, usual, [0..5, 0..3]).unwrap_err();
     assert_eq!(error.to_string(), "cells 0..5 x 0..3 are not a box within 4 x 3 cells");
     let depth = vec![0; columns.len()];
     let depths = Depths { depth: &depth, least: &[1], ..Depths::default() };
@@ -328,6 +333,6 @@ fn what_makes_no_sense_is_an_error() {
     // One row of cells has no quartet.
     let grid = Grid { size: [4, 1], ..columns.grid };
     let row = Columns::new(&Solids::new(grid, columns.heights, vec![vec![[BOTTOMLESS, TOP / 2]]; 4]));
-    let mut lifts = Lifts::default();
+    let mut lifts = MinimumHeights::default();
     assert_eq!(lifts.find(&row, &positions, &faces, usual).unwrap(), Fitted::default());
 }

@@ -11,7 +11,7 @@ use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::capi::runtime::context::{enter_light, frz_context};
 use crate::shallow::columns::Columns;
-use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::surface::{Counts, Depths, Indices, Layout, Surface, Target, Up, bound};
 
 /// Flag of a layout: Z is up. The axes are then (x, -z, y) in terms of those with Y up.
@@ -203,7 +203,7 @@ impl frz_shallow_target {
                 layers: self.layers.numbers("layers", 1)?,
                 columns: self.columns.numbers("columns", 1)?,
                 carried: {
-                    let mut carried = [const { None }; MOST];
+                    let mut carried = [const { None }; MAX_SCALARS];
                     for (to, span) in carried.iter_mut().zip(&self.scalars) {
                         *to = span.numbers("scalars", 1)?;
                     }

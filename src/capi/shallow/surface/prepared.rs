@@ -4,16 +4,16 @@
 use crate::capi::ffi::*;
 use crate::error::Result;
 use crate::shallow::Shallow;
-use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::surface::Depths;
-use crate::shallow::surface::heights::minimum_heights::Lifts;
+use crate::shallow::surface::heights::minimum_heights::MinimumHeights;
 use crate::shallow::surface::rim::ledges::Ledges;
 use crate::shallow::surface::rim::silhouette::Silhouette;
 
 /// What a surface shows of the flow.
 pub(in crate::capi) struct Needs {
     pub velocities: bool,
-    pub scalars: [bool; MOST],
+    pub scalars: [bool; MAX_SCALARS],
 }
 
 /// What surfaces show of the flow, for all column indices; empty unless the last one needed it.
@@ -22,7 +22,7 @@ pub(in crate::capi) struct Shown {
     /// Mean velocities (m/s).
     velocities: Vec<[f32; 2]>,
     /// Concentrations of scalars.
-    concentrations: [Vec<f32>; MOST],
+    concentrations: [Vec<f32>; MAX_SCALARS],
 }
 
 impl Shown {
@@ -84,7 +84,7 @@ impl Ledged {
 /// Minimum heights of a liquid.
 #[derive(Default)]
 pub(in crate::capi) struct Lifted {
-    pub lifts: Lifts,
+    pub lifts: MinimumHeights,
     /// Whether they match the current ground.
     pub is_current: bool,
 }

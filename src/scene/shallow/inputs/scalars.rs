@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::scene::Scene;
 use crate::scene::schema::{Table, Value, Values};
 use crate::scene::shallow::{ML, Point, Shallow};
-use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::{self, Law, Scalar, Thickening};
 
 /// Names of arrays that the surface already has in some file format.
@@ -69,8 +69,10 @@ pub(in crate::scene::shallow) fn check(index: usize, table: &Table, values: &Val
     let all = Carried::all_of(values);
     let Carried { scalar, start } = &all[index];
     let name = &*scalar.name;
-    if index >= MOST {
-        return Err(table.error("name", format!("is one too many: a liquid carries {MOST} scalars at most")));
+    if index >= MAX_SCALARS {
+        return Err(
+            table.error("name", format!("is one too many: a liquid carries {MAX_SCALARS} scalars at most"))
+        );
     }
     let is_word = |name: &str| {
         let is_letter = |byte: u8| byte.is_ascii_alphabetic() || byte == b'_';

@@ -7,8 +7,8 @@ use crate::scene::shallow::{Files, Shallow as Of};
 use crate::shallow::Shallow;
 use crate::shallow::free_fall::Droplet;
 use crate::shallow::free_fall::mesh::{Balls, Target as BallTarget};
-use crate::shallow::scalars::MOST;
-use crate::shallow::surface::heights::minimum_heights::{Distance, Lifts};
+use crate::shallow::scalars::MAX_SCALARS;
+use crate::shallow::surface::heights::minimum_heights::{Distance, MinimumHeights};
 use crate::shallow::surface::rim::ledges::Ledges;
 use crate::shallow::surface::rim::silhouette::Silhouette;
 use crate::shallow::surface::{Counts, Depths, Indices, Layout, Surface, Target};
@@ -23,11 +23,11 @@ const FADE_DEPTH: f64 = 0.02;
 pub(in crate::scene::shallow) struct Mesher {
     surface: Surface,
     balls: Balls,
-    lifts: Lifts,
+    lifts: MinimumHeights,
     ledges: Option<Ledges>,
     silhouette: Silhouette,
     velocity: Vec<[f32; 2]>,
-    concentrations: [Vec<f32>; MOST],
+    concentrations: [Vec<f32>; MAX_SCALARS],
     drops: Vec<Droplet>,
 }
 
@@ -104,7 +104,7 @@ impl Mesher {
             opaque_depth,
             ..Layout::default()
         };
-        let mut carried = [const { None }; MOST];
+        let mut carried = [const { None }; MAX_SCALARS];
         carried.iter_mut().zip(&mut drawn.scalars).for_each(|(to, (_, own))| *to = Some(&mut own[..]));
         let mut target = Target {
             positions: Some(&mut places),

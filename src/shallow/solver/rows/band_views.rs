@@ -6,7 +6,7 @@ use std::ops::Range;
 use crate::numeric::lists::split_each;
 use crate::shallow::columns::{Columns, STRIP};
 use crate::shallow::pipes::Links;
-use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::solver::link_flow::LinkFlow;
 
 /// Rows that a band sees beyond its own: three of whose transfers are found, and one of which only depths are read.
@@ -25,7 +25,7 @@ pub struct Part<'a> {
     /// Fluxes, remainders and transfers of links.
     pub links: LinkPart<'a>,
     /// Amounts of scalars; empty without them.
-    pub amounts: [&'a mut [f64]; MOST],
+    pub amounts: [&'a mut [f64]; MAX_SCALARS],
 }
 
 /// Links of a run of rows.
@@ -39,7 +39,7 @@ pub struct LinkPart<'a> {
     /// Transfer in this step (units).
     pub transfer: &'a mut [f32],
     /// Amounts that fell freely over each link; empty without scalars.
-    pub fallen: [&'a mut [f64]; MOST],
+    pub fallen: [&'a mut [f64]; MAX_SCALARS],
 }
 
 /// Copies of the rows beside a band.
@@ -51,7 +51,7 @@ pub struct Copy {
     flux: [Vec<f32>; 2],
     left: [Vec<f32>; 2],
     links: LinkFlow,
-    amounts: [Vec<f64>; MOST],
+    amounts: [Vec<f64>; MAX_SCALARS],
 }
 
 /// The three parts that a band sees: before it, its own, behind it.
@@ -107,7 +107,7 @@ impl<'a> Part<'a> {
         flux: [&'a mut [f32]; 2],
         left: [&'a mut [f32]; 2],
         links: &'a mut LinkFlow,
-        amounts: [&'a mut [f64]; MOST],
+        amounts: [&'a mut [f64]; MAX_SCALARS],
     ) -> Self {
         Self {
             start: 0,

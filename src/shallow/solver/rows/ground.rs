@@ -3,8 +3,8 @@
 use super::band_views::Parts;
 use crate::shallow::columns::Columns;
 use crate::shallow::pipes::Pipes;
-use crate::shallow::scalars::MOST;
-use crate::shallow::scalars::amounts::{Act, Changes};
+use crate::shallow::scalars::MAX_SCALARS;
+use crate::shallow::scalars::amounts::{Changes, LawEffect};
 use crate::shallow::solver::active::Active;
 use crate::shallow::solver::fast_films::Fast;
 use crate::shallow::solver::lateral_friction::Walls;
@@ -35,7 +35,7 @@ pub struct Ground<'a> {
     /// Minimum room of each row's columns (units).
     pub room: &'a [f32],
     /// Changes of scalars by their laws.
-    pub acts: &'a [Act],
+    pub law_effects: &'a [LawEffect],
 }
 
 impl<'a> Ground<'a> {
@@ -66,7 +66,7 @@ pub struct Stepped {
     /// Strips that became wet.
     pub woken: Vec<u32>,
     /// Changes of scalars.
-    pub carried: [Changes; MOST],
+    pub carried: [Changes; MAX_SCALARS],
 }
 
 /// Calls `add` with each column of a row that gives or receives through a link, and how much.

@@ -21,7 +21,7 @@ use super::transfers::whole_units::{find_woken, move_units};
 use super::viscous_flux::{Carried, Kind, Row, Step, by_kind, flux_row, max, solved_row};
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{NONE, STRIP};
-use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::scalars::amounts::Changes;
 use band_views::Parts;
 use buffers::{Buffer, RING, Rows, SWEEPS};
@@ -324,7 +324,13 @@ impl Rows {
     }
 
     /// Moves the scalars of a row's transfers; its depths are final.
-    fn carry(&mut self, ground: &Ground, parts: &mut Parts, row: usize, changes: &mut [Changes; MOST]) {
+    fn carry(
+        &mut self,
+        ground: &Ground,
+        parts: &mut Parts,
+        row: usize,
+        changes: &mut [Changes; MAX_SCALARS],
+    ) {
         let Self { carried, ring, .. } = self;
         let Buffer { east, south, .. } = &ring[row % RING];
         carried.move_links(ground, parts, row, changes);

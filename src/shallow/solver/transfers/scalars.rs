@@ -8,8 +8,8 @@ use super::whole_units::take_along;
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lists::refill;
 use crate::shallow::columns::{NONE, STRIP, strip_mut, strip_of};
-use crate::shallow::scalars::amounts::{Act, Changes};
-use crate::shallow::scalars::shares::{LEVELS, MOST, integer, level, nearest, share};
+use crate::shallow::scalars::amounts::{Changes, LawEffect};
+use crate::shallow::scalars::shares::{LEVELS, MAX_SCALARS, integer, level, nearest, share};
 use crate::shallow::solver::overflow_edges::{Fall, OverflowEdges};
 use crate::shallow::solver::pressurised::edges::At;
 use crate::shallow::solver::pressurised::network::Network;
@@ -69,7 +69,13 @@ impl Lanes {
 
     /// Moves the scalars of a row's links, from and to the band's own columns.
     #[inline(never)]
-    pub fn move_links(&self, ground: &Ground, parts: &mut Parts, row: usize, changes: &mut [Changes; MOST]) {
+    pub fn move_links(
+        &self,
+        ground: &Ground,
+        parts: &mut Parts,
+        row: usize,
+        changes: &mut [Changes; MAX_SCALARS],
+    ) {
         let links = &ground.pipes.links;
         let (is_own, own) = (parts.rows.contains(&row), indices(ground.columns, &parts.rows));
         let position = Place::new(ground.columns, row);
@@ -123,12 +129,12 @@ impl Lanes {
         parts: &mut Parts,
         row: usize,
         [east, south]: [&[f32]; 2],
-        changes: &mut [Changes; MOST],
+        changes: &mut [Changes; MAX_SCALARS],
     ) {
         let is_own = parts.rows.contains(&row);
         let (part, position) = (parts.of(row), Place::new(ground.columns, row));
         let Self { lanes, none } = self;
-        for (scalar, (lane, act)) in lanes.iter_mut().zip(ground.acts).enumerate() {
+        for (scalar, (lane, effect)) in lanes.iter_mut().zip(ground.law_effects).enumerate() {
             let [levels, beyond] =
                 [&lane.level[row % RING], &lane.level[(row + 1) % RING]].map(|levels| &levels[..]);
             let [own_south, north] = lane.south.get_disjoint_mut([row % 2, (row + 1) % 2]).expect("two rows");
@@ -160,8 +166,8 @@ impl Lanes {
                 let (depth, amount) =
                     (&part.depth[mine..mine + len], &mut part.amounts[scalar][mine..mine + len]);
                 changes.dried += i128::from(move_amounts(&around, depth, amount));
-                if *act != Act::default() {
-                    changes.grown += i128::from(obey(*act, depth, amount));
+                if *effect != LawEffect::default() {
+                    changes.grown += i128::from(apply_law(*effect, depth, amount));
                 }
             }
         }
@@ -214,27 +220,32 @@ fn move_amounts(around: &[&[f64]; 4], depth: &[i32], amount: &mut [f64]) -> i64 
 }
 
 /// Changes amounts by a law; returns the growth of their sum.
-fn obey(act: Act, depth: &[i32], amount: &mut [f64]) -> i64 {
-    return dispatch!(body(act: Act, depth: &[i32], amount: &mut [f64]) -> i64);
+fn apply_law(effect: LawEffect, depth: &[i32], amount: &mut [f64]) -> i64 {
+    return dispatch!(body(effect: LawEffect, depth: &[i32], amount: &mut [f64]) -> i64);
 
     #[inline(always)]
-    fn body(act: Act, depth: &[i32], amount: &mut [f64]) -> i64 {
+    fn body(effect: LawEffect, depth: &[i32], amount: &mut [f64]) -> i64 {
         let mut grown = [0; STRIP];
         for strip in 0..amount.len() / STRIP {
-            obey_strip(act, strip_of(depth, strip), strip_mut(amount, strip), &mut grown);
+            apply_to_strip(effect, strip_of(depth, strip), strip_mut(amount, strip), &mut grown);
         }
         grown.iter().sum()
     }
 
     #[inline(always)]
-    fn obey_strip(act: Act, depth: &[i32; STRIP], amount: &mut [f64; STRIP], grown: &mut [i64; STRIP]) {
+    fn apply_to_strip(
+        effect: LawEffect,
+        depth: &[i32; STRIP],
+        amount: &mut [f64; STRIP],
+        grown: &mut [i64; STRIP],
+    ) {
         for x in 0..STRIP {
             let depth = f64::from(depth[x]);
             let before = amount[x];
-            let kept = before - nearest(before * act.loses);
-            let older = kept + depth * act.grows;
+            let kept = before - nearest(before * effect.loses);
+            let older = kept + depth * effect.grows;
             let most = depth * LEVELS;
-            let now = if act.grows > 0.0 && older > most { most } else { older };
+            let now = if effect.grows > 0.0 && older > most { most } else { older };
             amount[x] = now;
             grown[x] += integer(now - before);
         }

@@ -1,7 +1,7 @@
 //! The caller's units and axes, and vertices in them.
 
 use crate::shallow::columns::Columns;
-use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::surface::{Layout, Target, Up};
 
 /// Velocity at the surface over the mean (Eq. 4.4).
@@ -29,7 +29,7 @@ pub(in crate::shallow) struct Vertex {
     pub normal: [f32; 3],
     /// Mean over the depth (m/s).
     pub velocity: [f32; 2],
-    pub carried: [f32; MOST],
+    pub carried: [f32; MAX_SCALARS],
     pub depth: i32,
     pub layer: u32,
     pub column: u32,

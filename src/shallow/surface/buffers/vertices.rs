@@ -6,7 +6,7 @@ use super::frame::{Frame, Vertex};
 use super::normals::{Normals, Shown, upright};
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{NONE, STRIP, strip_of};
-use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::surface::quartets::links::Scene;
 use crate::shallow::surface::quartets::strips::{Found, Span};
 use crate::shallow::surface::rim::boundary::{Around, Wall, walls_of};
@@ -23,7 +23,7 @@ pub(in crate::shallow::surface) struct Vertices<'a> {
     found: &'a Found,
     walls: &'a [Wall],
     velocity: &'a [[f32; 2]],
-    carried: [&'a [f32]; MOST],
+    carried: [&'a [f32]; MAX_SCALARS],
     wants_normals: bool,
     frame: Frame,
     /// The caller's units per metre, and how far hems are below the ground (units).
@@ -78,7 +78,7 @@ impl<'a> Vertices<'a> {
 
     /// The scalars that a column carries.
     #[inline(always)]
-    fn carried(&self, index: usize) -> [f32; MOST] {
+    fn carried(&self, index: usize) -> [f32; MAX_SCALARS] {
         self.carried.map(|numbers| numbers.get(index).copied().unwrap_or_default())
     }
 
@@ -98,7 +98,7 @@ impl<'a> Vertices<'a> {
         if !self.velocity.is_empty() {
             velocity = around.sum(|index| self.velocity[index]).map(|sum| sum / around.len().max(1) as f32);
         }
-        let mut carried = [0.0; MOST];
+        let mut carried = [0.0; MAX_SCALARS];
         if self.carried.iter().any(|numbers| !numbers.is_empty()) {
             carried = around.sum(|index| self.carried(index)).map(|sum| sum / around.len().max(1) as f32);
         }

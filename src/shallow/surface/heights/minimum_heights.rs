@@ -61,7 +61,7 @@ pub struct Fitted {
 
 /// Minimum depths at which columns are shown, and how far they are lowered where they are dry; reuses its memory.
 #[derive(Debug, Default)]
-pub struct Lifts {
+pub struct MinimumHeights {
     least: Vec<i32>,
     sunk: Vec<i32>,
     /// The strips of these arrays, and all three as they were before the last change.
@@ -69,7 +69,7 @@ pub struct Lifts {
     old: (Vec<i32>, Vec<i32>, Vec<Strip>),
     above: Vec<u32>,
     /// Uncovered vertices of the last call.
-    bare: Vec<u32>,
+    uncovered: Vec<u32>,
     /// For each vertex of the mesh, the area of the triangles around it, seen from above: negative where they face down.
     facing: Vec<f64>,
 }
@@ -93,10 +93,10 @@ struct Area<'a> {
     rim: f64,
 }
 
-impl Lifts {
-    /// Reserves memory for this many strips and vertices: [`Lifts::update`] then allocates nothing as long as there are no more.
+impl MinimumHeights {
+    /// Reserves memory for this many strips and vertices: [`MinimumHeights::update`] then allocates nothing as long as there are no more.
     pub fn reserve(&mut self, strips: usize, vertices: usize) {
-        let Self { least, sunk, strips: own, old, above, bare, facing } = self;
+        let Self { least, sunk, strips: own, old, above, uncovered, facing } = self;
         for numbers in [least, sunk, &mut old.0, &mut old.1] {
             numbers.reserve((strips * STRIP).saturating_sub(numbers.len()));
         }
@@ -104,7 +104,7 @@ impl Lifts {
             list.reserve(strips.saturating_sub(list.len()));
         }
         above.reserve(strips.saturating_sub(above.len()));
-        bare.reserve(vertices.saturating_sub(bare.len()));
+        uncovered.reserve(vertices.saturating_sub(uncovered.len()));
         facing.reserve(vertices.saturating_sub(facing.len()));
     }
 
@@ -120,8 +120,8 @@ impl Lifts {
     }
 
     /// Vertices that may still be above the surface, of those that the last call examined: discarded, or under a low ceiling; in order.
-    pub fn bare(&self) -> &[u32] {
-        &self.bare
+    pub fn uncovered(&self) -> &[u32] {
+        &self.uncovered
     }
 
     /// Finds the minimum heights of all columns from the terrain's mesh: positions (m), and triangles that are counter-clockwise seen from
@@ -145,7 +145,7 @@ impl Lifts {
     /// and the old and new positions of changed triangles, must lie in the box; other columns may have other indices.
     ///
     /// # Errors
-    /// As [`Lifts::find`]; also a box that is not within the grid.
+    /// As [`MinimumHeights::find`]; also a box that is not within the grid.
     pub fn update(
         &mut self,
         columns: &Columns,
@@ -174,13 +174,13 @@ impl Lifts {
         let area = Area { scene, cells, cell, least: least * cell, margin: margin * cell, rim: rim * cell };
         area.face(positions, triangles, &mut self.facing)?;
         area.clear(&mut self.least, &mut self.sunk);
-        self.bare.clear();
+        self.uncovered.clear();
         let mut out = Fitted::default();
         for (vertex, at) in positions.iter().enumerate().filter(|(vertex, _)| self.facing[*vertex] > 0.0) {
             let before = out;
             area.fit(at, [&mut self.least, &mut self.sunk], &mut out);
             if out.discarded + out.capped > before.discarded + before.capped {
-                self.bare.push(vertex as u32);
+                self.uncovered.push(vertex as u32);
             }
         }
         Ok(out)

@@ -4,7 +4,7 @@
 use super::stitches::Stitches;
 use crate::numeric::lists::{refill, reset};
 use crate::shallow::columns::Columns;
-use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::surface::buffers::frame::{Frame, Vertex};
 use crate::shallow::surface::buffers::normals::upright;
 use crate::shallow::surface::heights::shown::height_of;
@@ -62,7 +62,7 @@ impl<'a> Columnar<'a> {
         depths.velocity.get(index).copied().unwrap_or_default()
     }
 
-    fn carried(self, id: u32) -> [f32; MOST] {
+    fn carried(self, id: u32) -> [f32; MAX_SCALARS] {
         let (_, depths, index) = self.of(id);
         depths.carried.map(|numbers| numbers.get(index).copied().unwrap_or_default())
     }
