@@ -28,7 +28,7 @@ pub mod tiles;
 mod vorticity;
 mod window;
 
-pub use crate::flow::advection::scheme::Keeping;
+pub use crate::flow::advection::scheme::MassConservation;
 pub use crate::flow::advection::scheme::Scheme;
 pub use advection::paths::FARTHEST;
 pub use pressure::Solved;
@@ -41,7 +41,7 @@ use rayon::prelude::*;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use pressure::multigrid::Multigrid;
-use scratch::Room;
+use scratch::Scratch;
 
 /// A velocity, a density and a pressure on sparse tiles.
 #[derive(Debug, Default)]
@@ -61,7 +61,7 @@ pub struct Flow {
     around: Option<Box<Flow>>,
     /// The operator of the last projection and its preconditioner.
     multigrid: Multigrid,
-    room: Room,
+    scratch_fields: Scratch,
 }
 
 /// Open fractions and speeds of faces, for tiles and an edge (m) of their cells.
@@ -80,7 +80,7 @@ impl Flow {
             return Err(Error::argument("the wind is not finite"));
         }
         let cell = cell as f32;
-        let wide = |level: u32| cell * outer_grid::WIDER.pow(level) as f32;
+        let wide = |level: u32| cell * outer_grid::RATIO.pow(level) as f32;
         let mut flow = Self { cell: wide(outer_grid::LEVELS), ambient, ..Self::default() };
         for level in (0..outer_grid::LEVELS).rev() {
             let cell = wide(level);
@@ -119,36 +119,36 @@ impl Flow {
         pressure::fastest(&self.velocity)
     }
 
-    /// The speed (m/s, rounded up by less than 1 %) on any axis that all but a share 0..=1 of the faces do not exceed.
-    pub fn fastest_but(&self, share: f64) -> f32 {
-        pressure::fastest_but(&self.velocity, share)
+    /// Speed (m/s, rounded up by less than 1 %) on any axis that only a share 0..=1 of the faces exceeds.
+    pub fn fastest_except(&self, share: f64) -> f32 {
+        pressure::fastest_except(&self.velocity, share)
     }
 
-    /// Makes these tiles (sorted, without duplicates) the active ones: existing values are kept; new tiles hold air that moves as the
-    /// surrounding air did there, with no density.
+    /// Makes these tiles (sorted, without duplicates) the active ones. Existing values are kept; new tiles take the velocity of the
+    /// surrounding air, and a density of 0.
     pub fn resize(&mut self, active: &[Coord]) {
         if &self.tiles.coords()[..self.tiles.active()] == active {
             return;
         }
         let old = std::mem::replace(&mut self.tiles, Tiles::new(active));
-        let Self { tiles, velocity, density, pressure, room, .. } = self;
+        let Self { tiles, velocity, density, pressure, scratch_fields, .. } = self;
         let find = |coord: &Coord| old.find(*coord).unwrap_or(tiles::NONE);
         let from: Vec<u32> = tiles.coords().par_iter().with_min_len(64).map(find).collect();
         for (field, speed) in velocity.iter_mut().zip(self.ambient) {
-            room.move_wide(field, &from, speed);
+            scratch_fields.move_with_rim(field, &from, speed);
         }
-        room.move_wide(pressure, &from, 0.0);
-        room.move_active(density, &from[..tiles.active()], 0.0);
+        scratch_fields.move_with_rim(pressure, &from, 0.0);
+        scratch_fields.move_active(density, &from[..tiles.active()], 0.0);
         if let Some(around) = &mut self.around {
             around.resize(&outer_grid::tiles_around(active));
         }
         let tiles = std::mem::take(&mut self.tiles);
-        self.read_around(&tiles, &old);
+        self.set_outer_velocity(&tiles, &old);
         self.tiles = tiles;
     }
 
     /// Sets the velocity at the faces of `tiles` from the surrounding air, except at faces of cells that are active in `set`.
-    fn read_around(&mut self, tiles: &Tiles, set: &Tiles) {
+    fn set_outer_velocity(&mut self, tiles: &Tiles, set: &Tiles) {
         let Some(around) = &self.around else { return };
         for axis in 0..3 {
             let reader = around.faces(axis);
@@ -176,20 +176,20 @@ impl Flow {
     pub fn project(&mut self, ctx: &Context, boundary: &Boundary<'_>, tolerance: f32) -> Result<Solved> {
         if let Some(mut around) = self.around.take() {
             outer_grid::restrict(self, &mut around);
-            std::mem::swap(&mut around.room, &mut self.room);
+            std::mem::swap(&mut around.scratch_fields, &mut self.scratch_fields);
             let solved = around.project(ctx, boundary, tolerance);
-            std::mem::swap(&mut around.room, &mut self.room);
-            self.press(&around);
+            std::mem::swap(&mut around.scratch_fields, &mut self.scratch_fields);
+            self.take_rim_pressure(&around);
             self.around = Some(around);
             solved?;
         }
         let solids = boundary(&self.tiles, self.cell)?;
-        let Self { tiles, velocity, pressure, multigrid, room, .. } = self;
-        let fields = room.six(tiles);
+        let Self { tiles, velocity, pressure, multigrid, scratch_fields, .. } = self;
+        let fields = scratch_fields.six(tiles);
         let solved =
             pressure::project(ctx, (tiles, &solids), velocity, pressure, multigrid, fields, tolerance)?;
         let tiles = std::mem::take(&mut self.tiles);
-        self.read_around(&tiles, &tiles);
+        self.set_outer_velocity(&tiles, &tiles);
         self.tiles = tiles;
         Ok(solved)
     }
@@ -204,15 +204,15 @@ impl Flow {
         }
     }
 
-    /// Takes the pressure in the rim from the surrounding air.
-    fn press(&mut self, around: &Self) {
-        let wide = outer_grid::continued(&around.multigrid.finest, &around.pressure);
+    /// Sets the pressure in the rim from the surrounding air.
+    fn take_rim_pressure(&mut self, around: &Self) {
+        let wide = outer_grid::extrapolated(&around.multigrid.finest, &around.pressure);
         let reader = outer_grid::Reader { tiles: &around.tiles, field: &wide, axis: None, outside: 0.0 };
         let (tiles, active) = (&self.tiles, self.tiles.active());
         let rim = self.pressure[active..].par_iter_mut().enumerate().with_min_len(4);
         rim.for_each_init(window::Window::default, |window, (index, tile)| {
             *tile = reader.read(window, tiles.coords()[active + index]);
-            tile.iter_mut().for_each(|pressure| *pressure *= outer_grid::WIDER as f32);
+            tile.iter_mut().for_each(|pressure| *pressure *= outer_grid::RATIO as f32);
         });
     }
 

@@ -13,30 +13,30 @@ use super::window::{Span, Window};
 use crate::numeric::cpu::dispatch;
 
 /// Ratio of the cell width of a surrounding flow to that of the flow inside it.
-pub const WIDER: i32 = 2;
-/// How many flows surround a flow, each around the one before.
+pub const RATIO: i32 = 2;
+/// Number of surrounding flows, one around the other.
 pub const LEVELS: u32 = 3;
 /// Tiles of wide cells around those that hold fine ones.
 const PADDING: i32 = 1;
 
 /// Sorted coordinates of the wide tiles around fine ones.
 pub fn tiles_around(fine: &[Coord]) -> Vec<Coord> {
-    let mut wide: Vec<Coord> = fine.iter().map(|coord| coord.map(|x| x.div_euclid(WIDER))).collect();
+    let mut wide: Vec<Coord> = fine.iter().map(|coord| coord.map(|x| x.div_euclid(RATIO))).collect();
     wide.sort_unstable();
     wide.dedup();
     padded(&wide, PADDING)
 }
 
 /// Wide cells along the edge of a fine tile.
-const PART: usize = 8 / WIDER as usize;
+const COARSE_EDGE: usize = 8 / RATIO as usize;
 /// Wide cells in a fine tile.
-const PARTS: usize = PART * PART * PART;
+const COARSE_CELLS: usize = COARSE_EDGE * COARSE_EDGE * COARSE_EDGE;
 
 /// Writes the mean fine velocity into the wide faces that fine faces of active cells cover.
 pub fn restrict(fine: &Flow, wide: &mut Flow) {
     let (tiles, velocity) = (&fine.tiles, &fine.velocity);
     for axis in 0..3 {
-        let means: Vec<[f32; PARTS]> =
+        let means: Vec<[f32; COARSE_CELLS]> =
             velocity[axis].par_iter().with_min_len(16).map(|tile| means_of(tile, axis)).collect();
         for (slot, means) in means.into_iter().enumerate() {
             let is_active = slot < tiles.active();
@@ -45,11 +45,11 @@ pub fn restrict(fine: &Flow, wide: &mut Flow) {
                 continue;
             }
             let coord = tiles.coords()[slot];
-            let Some(parent) = wide.tiles.find(coord.map(|x| x.div_euclid(WIDER))) else { continue };
-            let corner = coord.map(|x| x.rem_euclid(WIDER) as usize * PART);
+            let Some(parent) = wide.tiles.find(coord.map(|x| x.div_euclid(RATIO))) else { continue };
+            let corner = coord.map(|x| x.rem_euclid(RATIO) as usize * COARSE_EDGE);
             let tile = &mut wide.velocity[axis][parent as usize];
             for (index, mean) in means.into_iter().enumerate() {
-                let at = part(index);
+                let at = position_of(index);
                 // In the rim only the first faces bound active cells.
                 if is_active || at[axis] == 0 {
                     tile[(corner[0] + at[0]) << 6 | (corner[1] + at[1]) << 3 | (corner[2] + at[2])] = mean;
@@ -59,15 +59,15 @@ pub fn restrict(fine: &Flow, wide: &mut Flow) {
     }
 }
 
-/// Position of a wide cell in a fine tile.
-fn part(index: usize) -> [usize; 3] {
-    [index / (PART * PART), index / PART % PART, index % PART]
+/// Position of a wide cell in a fine tile, from its index.
+fn position_of(index: usize) -> [usize; 3] {
+    [index / (COARSE_EDGE * COARSE_EDGE), index / COARSE_EDGE % COARSE_EDGE, index % COARSE_EDGE]
 }
 
 /// Means over the faces of the wide cells in a fine tile.
-fn means_of(tile: &Tile, axis: usize) -> [f32; PARTS] {
+fn means_of(tile: &Tile, axis: usize) -> [f32; COARSE_CELLS] {
     std::array::from_fn(|index| {
-        let at = part(index).map(|x| WIDER as usize * x);
+        let at = position_of(index).map(|x| RATIO as usize * x);
         let face = |a: usize, b: usize| {
             let [x, y, z] = match axis {
                 0 => [0, a, b],
@@ -76,7 +76,7 @@ fn means_of(tile: &Tile, axis: usize) -> [f32; PARTS] {
             };
             tile[(at[0] + x) << 6 | (at[1] + y) << 3 | (at[2] + z)]
         };
-        // In an order that is the same for mirrored fields.
+        // Summed so that mirrored fields have mirrored results.
         0.25 * ((face(0, 0) + face(1, 1)) + (face(0, 1) + face(1, 0)))
     })
 }
@@ -94,7 +94,7 @@ pub struct Reader<'a> {
 }
 
 /// Wide cells on an axis that the interpolation of a fine tile reads: those that the tile covers and one on each side.
-const READ: usize = PART + 2;
+const READ: usize = COARSE_EDGE + 2;
 
 /// For each of eight fine positions on an axis: the first of the two wide cells that are read, as an index into [`READ`], and the weight of
 /// the second.
@@ -104,7 +104,7 @@ type Weights = [(usize, f32); 8];
 fn weights(is_centre: bool) -> Weights {
     let half = if is_centre { 0.5 } else { 0.0 };
     std::array::from_fn(|fine| {
-        let at = (fine as f32 + half) / WIDER as f32 - half + 1.0;
+        let at = (fine as f32 + half) / RATIO as f32 - half + 1.0;
         (at as usize, at - at.floor())
     })
 }
@@ -112,10 +112,10 @@ fn weights(is_centre: bool) -> Weights {
 impl Reader<'_> {
     /// Interpolates at the positions of a fine tile's values.
     pub fn read(&self, window: &mut Window, coord: Coord) -> Tile {
-        let parent = coord.map(|x| x.div_euclid(WIDER));
+        let parent = coord.map(|x| x.div_euclid(RATIO));
         let mut out = [self.outside; 512];
         let Some(slot) = self.tiles.find(parent) else { return out };
-        let corner = coord.map(|x| x.rem_euclid(WIDER) * PART as i32 - 1);
+        let corner = coord.map(|x| x.rem_euclid(RATIO) * COARSE_EDGE as i32 - 1);
         let span = Span::new(corner, corner.map(|x| x + READ as i32));
         window.fill(self.field, &self.tiles.neighbours()[slot as usize], &span, self.outside);
         let weights = [0, 1, 2].map(|axis| weights(self.axis != Some(axis)));
@@ -156,8 +156,8 @@ fn interpolate_rows(window: &Window, corner: [i32; 3], weights: &[Weights; 3], o
     }
 }
 
-/// The wide pressure; cells that take no part get the mean of their neighbours.
-pub fn continued(operator: &Operator, pressure: &Field) -> Field {
+/// The wide pressure, extrapolated into covered cells: these get the mean of their neighbours.
+pub fn extrapolated(operator: &Operator, pressure: &Field) -> Field {
     let takes_part =
         |slot: usize, cell: usize| operator.stencil(slot).is_none_or(|stencil| stencil.inverse[cell] > 0.0);
     let tiles = &operator.tiles;
@@ -170,7 +170,7 @@ pub fn continued(operator: &Operator, pressure: &Field) -> Field {
             let (mut sum, mut count) = (0.0, 0.0);
             for axis in 0..3 {
                 for upper in [false, true] {
-                    let (near, cell) = tiles.beside(slot, cell, axis, upper);
+                    let (near, cell) = tiles.adjacent_cell(slot, cell, axis, upper);
                     if (near as usize) < tiles.active() && takes_part(near as usize, cell) {
                         sum += pressure[near as usize][cell];
                         count += 1.0;

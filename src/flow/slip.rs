@@ -23,12 +23,13 @@ pub fn extend(tiles: &Tiles, operator: &Operator, solids: &Solids, velocity: &mu
     let slots: Vec<usize> = (0..tiles.count()).filter(|slot| solids.faces(*slot).is_some()).collect();
     let mut index = vec![NONE; tiles.count()];
     slots.iter().zip(0u32..).for_each(|(slot, at)| index[*slot] = at);
-    let flows: Vec<[u64; 8]> = (0..tiles.count())
+    let flow_cells: Vec<[u64; 8]> = (0..tiles.count())
         .into_par_iter()
         .with_min_len(16)
-        .map(|slot| flows(tiles, operator, slot))
+        .map(|slot| flow_cells(tiles, operator, slot))
         .collect();
-    let mut known: Vec<Known> = slots.par_iter().map(|slot| known_of(tiles, &flows, solids, *slot)).collect();
+    let mut known: Vec<Known> =
+        slots.par_iter().map(|slot| known_of(tiles, &flow_cells, solids, *slot)).collect();
     for _ in 0..LAYERS {
         let of = |slot: u32, axis: usize| match index.get(slot as usize) {
             None => [0; 8],
@@ -45,15 +46,15 @@ pub fn extend(tiles: &Tiles, operator: &Operator, solids: &Solids, velocity: &mu
                         continue;
                     }
                     let six = FACES.map(|at| of(tiles.neighbours()[slot][at], axis));
-                    let beside = beside(&own[axis], &six);
+                    let adjacent = adjacent(&own[axis], &six);
                     for cell in
-                        (0..8).flat_map(|x| bits(beside[x] & !own[axis][x]).map(move |at| x << 6 | at))
+                        (0..8).flat_map(|x| bits(adjacent[x] & !own[axis][x]).map(move |at| x << 6 | at))
                     {
                         let (mut sums, mut count) = ([0.0f32; 3], 0);
                         for (across, sum) in sums.iter_mut().enumerate() {
                             let mut both = [0.0; 2];
                             for (side, value) in both.iter_mut().enumerate() {
-                                let (near, cell) = tiles.beside(slot, cell, across, side == 1);
+                                let (near, cell) = tiles.adjacent_cell(slot, cell, across, side == 1);
                                 let mask =
                                     if near as usize == slot { &own[axis] } else { &six[2 * across + side] };
                                 if mask[cell >> 6] >> (cell & 63) & 1 == 1 {
@@ -95,7 +96,7 @@ const FIRST: u64 = 0x0101_0101_0101_0101;
 const ROW: u64 = 0xff;
 
 /// The positions adjacent to those of a mask, given the masks of the six adjacent tiles.
-fn beside(own: &[u64; 8], [low_x, high_x, low_y, high_y, low_z, high_z]: &[[u64; 8]; 6]) -> [u64; 8] {
+fn adjacent(own: &[u64; 8], [low_x, high_x, low_y, high_y, low_z, high_z]: &[[u64; 8]; 6]) -> [u64; 8] {
     std::array::from_fn(|x| {
         let left = if x > 0 { own[x - 1] } else { low_x[7] };
         let right = if x < 7 { own[x + 1] } else { high_x[0] };
@@ -108,7 +109,7 @@ fn beside(own: &[u64; 8], [low_x, high_x, low_y, high_y, low_z, high_z]: &[[u64;
 }
 
 /// The cells of a tile that belong to the flow: bit `y << 3 | z` of word `x`.
-fn flows(tiles: &Tiles, operator: &Operator, slot: usize) -> [u64; 8] {
+fn flow_cells(tiles: &Tiles, operator: &Operator, slot: usize) -> [u64; 8] {
     if slot >= tiles.active() {
         return [0; 8];
     }
@@ -125,13 +126,13 @@ fn mask(tile: &Tile) -> [u64; 8] {
 }
 
 /// The faces of a tile that bound a cell of the flow or are open.
-fn known_of(tiles: &Tiles, flows: &[[u64; 8]], solids: &Solids, slot: usize) -> Known {
+fn known_of(tiles: &Tiles, flow_cells: &[[u64; 8]], solids: &Solids, slot: usize) -> Known {
     let Some(faces) = solids.faces(slot) else { return ALL };
-    let own = &flows[slot];
+    let own = &flow_cells[slot];
     [0, 1, 2].map(|axis| {
         let open = mask(&faces.open[axis]);
         let below = tiles.neighbours()[slot][FACES[2 * axis]] as usize;
-        let below = flows.get(below).unwrap_or(&[0; 8]);
+        let below = flow_cells.get(below).unwrap_or(&[0; 8]);
         std::array::from_fn(|x| {
             let lower = match axis {
                 0 if x > 0 => own[x - 1],
@@ -163,10 +164,10 @@ mod tests {
         for _ in 0..100 {
             let (own, six): ([u64; 8], [[u64; 8]; 6]) =
                 (std::array::from_fn(|_| word()), std::array::from_fn(|_| std::array::from_fn(|_| word())));
-            let found = beside(&own, &six);
+            let found = adjacent(&own, &six);
             for cell in 0..512usize {
                 let wanted = (0..6).any(|face| {
-                    let (slot, at) = tiles.beside(0, cell, face / 2, face % 2 == 1);
+                    let (slot, at) = tiles.adjacent_cell(0, cell, face / 2, face % 2 == 1);
                     let mask = if slot == 0 { &own } else { &six[face] };
                     assert!(slot == 0 || slot == near[FACES[face]]);
                     mask[at >> 6] >> (at & 63) & 1 == 1

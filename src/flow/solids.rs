@@ -52,7 +52,7 @@ impl Solids {
             let pairs = faces.open.iter().flatten().zip(faces.speed.iter().flatten());
             pairs.filter(|(open, _)| **open < 1.0)
         });
-        covered.fold(0.0, |most, (_, speed)| super::window::max(most, speed.abs()))
+        covered.fold(0.0, |max, (_, speed)| super::window::max(max, speed.abs()))
     }
 
     /// Whether there are no solids.

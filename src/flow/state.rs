@@ -3,12 +3,12 @@
 use rayon::prelude::*;
 
 use super::Flow;
-use super::scratch::first;
+use super::scratch::first_tiles;
 use super::tiles::{Coord, Field, Tile, Tiles};
 use crate::error::{Error, Result, fail_if};
 use crate::numeric::bytes::{Reader, Writer};
 
-/// What a flow carries from step to step.
+/// The state that a flow carries from step to step.
 #[derive(Debug, Default)]
 pub struct FlowState {
     tiles: Tiles,
@@ -19,13 +19,13 @@ pub struct FlowState {
 }
 
 /// Maximum absolute coordinate of a tile.
-const OUTERMOST: i32 = 1 << 26;
+const MAX_COORD: i32 = 1 << 26;
 /// Bytes of a tile of one field.
 const TILE: usize = 4 * 512;
 
 impl FlowState {
     /// Copies the persistent state of a flow. Reuses its own memory.
-    pub fn become_of(&mut self, flow: &Flow) {
+    pub fn copy_from(&mut self, flow: &Flow) {
         self.tiles.clone_from(&flow.tiles);
         for (to, from) in self.velocity.iter_mut().zip(&flow.velocity) {
             copy(from, to);
@@ -33,14 +33,14 @@ impl FlowState {
         copy(&flow.density, &mut self.density);
         copy(&flow.pressure, &mut self.pressure);
         if let Some(around) = &flow.around {
-            self.around.get_or_insert_default().become_of(around);
+            self.around.get_or_insert_default().copy_from(around);
         }
     }
 }
 
 fn copy(from: &[Tile], to: &mut Field) {
     to.truncate(from.len());
-    first(to, from.len()).par_iter_mut().zip(from).with_min_len(64).for_each(|(to, from)| *to = *from);
+    first_tiles(to, from.len()).par_iter_mut().zip(from).with_min_len(64).for_each(|(to, from)| *to = *from);
 }
 
 impl Flow {
@@ -58,14 +58,14 @@ impl Flow {
         }
     }
 
-    /// Restores this flow from `kept`, whose contents are then meaningless; only its memory can be reused.
-    pub fn put_back(&mut self, kept: &mut FlowState) {
+    /// Restores this flow from `kept`, whose contents are then undefined; only its memory can be reused.
+    pub fn restore(&mut self, kept: &mut FlowState) {
         std::mem::swap(&mut self.tiles, &mut kept.tiles);
         std::mem::swap(&mut self.velocity, &mut kept.velocity);
         std::mem::swap(&mut self.density, &mut kept.density);
         std::mem::swap(&mut self.pressure, &mut kept.pressure);
         if let (Some(own), Some(around)) = (&mut self.around, &mut kept.around) {
-            own.put_back(around);
+            own.restore(around);
         }
     }
 
@@ -86,7 +86,7 @@ impl Flow {
     /// Bytes that are not such a state; the flow is then unchanged.
     pub fn load(&mut self, from: &mut Reader<'_>) -> Result<()> {
         let mut kept = self.read(from)?;
-        self.put_back(&mut kept);
+        self.restore(&mut kept);
         Ok(())
     }
 
@@ -94,7 +94,7 @@ impl Flow {
         let count = from.count(12)?;
         let coords: Vec<Coord> = (0..count).map(|_| from.i32s()).collect::<Result<_>>()?;
         if !coords.is_sorted_by(|a, b| a < b)
-            || coords.iter().flatten().any(|at| !(-OUTERMOST..=OUTERMOST).contains(at))
+            || coords.iter().flatten().any(|at| !(-MAX_COORD..=MAX_COORD).contains(at))
         {
             return Err(Error::Bytes("has tiles out of order, or too far from the origin".into()));
         }

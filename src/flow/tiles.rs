@@ -75,7 +75,7 @@ impl Tiles {
     }
 
     /// Whether both are the same set of tiles.
-    pub fn is_of(&self, other: &Self) -> bool {
+    pub fn is_same_set(&self, other: &Self) -> bool {
         self.active == other.active && self.coords == other.coords
     }
 
@@ -100,7 +100,7 @@ impl Tiles {
     }
 
     /// The cell adjacent to a cell on an axis, and its tile.
-    pub fn beside(&self, slot: usize, cell: usize, axis: usize, upper: bool) -> (u32, usize) {
+    pub fn adjacent_cell(&self, slot: usize, cell: usize, axis: usize, upper: bool) -> (u32, usize) {
         let step = 64 >> (3 * axis);
         match (upper, cell / step % 8) {
             (true, 7) => (self.neighbours[slot][FACES[2 * axis + 1]], cell - 7 * step),
@@ -112,7 +112,7 @@ impl Tiles {
 
     /// The values of the six neighbours that share a face with an active tile, in the order of [`FACES`]; zeros where the
     /// field has none.
-    pub fn six<'a>(&self, field: &'a [Tile], slot: usize) -> [&'a Tile; 6] {
+    pub fn face_neighbours<'a>(&self, field: &'a [Tile], slot: usize) -> [&'a Tile; 6] {
         FACES.map(|at| field.get(self.neighbours[slot][at] as usize).unwrap_or(&ZEROS))
     }
 }
@@ -167,15 +167,15 @@ pub fn padded(tiles: &[Coord], padding: i32) -> Vec<Coord> {
     out
 }
 
-/// Sorted coordinates of the tiles within this many steps over a face or an edge.
+/// Sorted coordinates of the tiles within this many steps, each across a face or an edge.
 pub fn bordered(tiles: &[Coord], steps: usize) -> Vec<Coord> {
     let mut out = tiles.to_vec();
     for _ in 0..steps {
         // Pairs of axes: the tiles within one tile on both axes of a pair.
         let pairs = [[0, 1], [0, 2], [1, 2]].into_iter().flat_map(|[a, b]| {
-            let ways = (-1..=1).flat_map(|i| (-1..=1).map(move |j| (i, j)));
+            let offsets = (-1..=1).flat_map(|i| (-1..=1).map(move |j| (i, j)));
             let out = &out;
-            ways.flat_map(move |(i, j)| out.iter().map(move |coord| shifted(shifted(*coord, a, i), b, j)))
+            offsets.flat_map(move |(i, j)| out.iter().map(move |coord| shifted(shifted(*coord, a, i), b, j)))
         });
         out = merged(pairs.collect());
     }

@@ -12,8 +12,8 @@ use crate::error::Result;
 /// Margin (cells) around a tile in which velocities at centres, and vorticities, are computed.
 const CENTRES: usize = 3;
 const CURLS: usize = 2;
-/// Below this vorticity times a cell (m/s) its direction is undefined.
-const LEAST: f32 = 1.0e-6;
+/// Minimum difference of the vorticity, times a cell (m/s), across two cells: below it the direction to the maximum is undefined.
+const MIN_DIFFERENCE: f32 = 1.0e-6;
 
 /// Vectors in a cube of cells: a tile and a margin.
 struct Cube {
@@ -108,7 +108,7 @@ fn pushes(windows: &[Window; 3], gain: f32) -> [Tile; 3] {
             ahead - back
         });
         let steep = length(toward);
-        if steep < LEAST {
+        if steep < MIN_DIFFERENCE {
             continue;
         }
         let n = toward.map(|x| x / steep);

@@ -1,4 +1,4 @@
-//! Raggedness of the edges of prints.
+//! Parameters of the ragged edges of imprints.
 
 use std::ops::RangeInclusive;
 
@@ -12,14 +12,14 @@ pub struct NoiseParams {
     pub amplitude: f64,
     /// Size of the largest clumps (m).
     pub size: f64,
-    /// Octaves, each of half the size and a quarter of the strength, 1..=8.
+    /// Octaves, each of half the size and a quarter of the strength of the one before, 1..=8.
     pub octaves: u32,
     /// Seed of the pattern.
     pub seed: i32,
 }
 
 /// Steepest slope of one octave of unit size and strength (a test samples it).
-pub(super) const STEEPEST: f64 = 2.95;
+pub(super) const MAX_SLOPE: f64 = 2.95;
 
 impl NoiseParams {
     /// Two cells of amplitude, clumps of eight cells, three octaves.
@@ -30,7 +30,7 @@ impl NoiseParams {
     /// Checks every field for a given cell size (m).
     ///
     /// # Errors
-    /// Names the field and its range; refuses noise so steep that it would leave islands.
+    /// Names the field and its range, or noise so steep that it would leave islands.
     pub fn validate(&self, cell: f64) -> Result<()> {
         let within = |name: &str, value: f64, range: RangeInclusive<f64>| {
             let (low, high) = (range.start(), range.end());
@@ -42,22 +42,22 @@ impl NoiseParams {
         if !(1..=8).contains(&self.octaves) {
             return Err(Error::argument(format!("noise octaves = {} is not within 1 to 8", self.octaves)));
         }
-        let most = self.steepest();
-        if self.amplitude > most {
+        let max = self.max_amplitude();
+        if self.amplitude > max {
             return Err(Error::argument(format!(
-                "noise amplitude = {} m is too steep for size = {} m and would leave islands: at most {most:.4} m",
+                "noise amplitude = {} m is too steep for size = {} m and would leave islands: at most {max:.4} m",
                 self.amplitude, self.size
             )));
         }
         Ok(())
     }
 
-    /// Sensible amplitudes (m) for a cell size (m).
+    /// Allowed amplitudes (m) for a cell size (m).
     pub fn amplitudes(cell: f64) -> RangeInclusive<f64> {
         0.0..=32.0 * cell
     }
 
-    /// Sensible sizes (m) for a cell size (m): below two cells the grid cannot represent the noise.
+    /// Allowed sizes (m) for a cell size (m): below two cells the grid cannot represent the noise.
     pub fn sizes(cell: f64) -> RangeInclusive<f64> {
         2.0 * cell..=10_000.0 * cell
     }
@@ -65,8 +65,8 @@ impl NoiseParams {
     /// The maximum amplitude (m) that leaves no islands at this size: the displacement's slope stays below 1.
     ///
     /// Octave o has strength 4^-o and slope 2^-o, within a sum scaled to 1.
-    pub fn steepest(&self) -> f64 {
+    pub fn max_amplitude(&self) -> f64 {
         let sum = |ratio: f64| (0..self.octaves).map(|octave| ratio.powi(octave as i32)).sum::<f64>();
-        self.size * sum(0.25) / (STEEPEST * sum(0.5))
+        self.size * sum(0.25) / (MAX_SLOPE * sum(0.5))
     }
 }

@@ -74,7 +74,7 @@ unsafe impl Sized32 for frz_grains_params {
     /// For voxels of 1 cm.
     fn defaults() -> Self {
         let params = Params::for_cell(0.01);
-        Self { lowest: -FARTHEST, max_grains: params.most as u64, ..params.into() }
+        Self { lowest: -FARTHEST, max_grains: params.max_grains as u64, ..params.into() }
     }
 }
 
@@ -115,7 +115,7 @@ impl frz_grains_params {
             rests: self.flags & FRZ_GRAINS_RESTLESS == 0,
             active_distance: Some(self.active_distance).filter(|&distance| distance > 0.0),
             sub_steps: Some(self.sub_steps).filter(|&count| count > 0),
-            most: self.max_grains as usize,
+            max_grains: self.max_grains as usize,
             ..self.over(Params::for_cell(0.01))
         };
         params.validate()?;
@@ -150,7 +150,7 @@ pub unsafe extern "C" fn frz_grains_params_of_snow(
 ) -> frz_status {
     // SAFETY: the parameters are NULL or valid.
     guard(|| unsafe {
-        within("repose_angle_deg", repose_angle_deg, 0.0..=grain_friction::STEEPEST, " degrees")?;
+        within("repose_angle_deg", repose_angle_deg, 0.0..=grain_friction::MAX_REPOSE, " degrees")?;
         within("stands", stands, 0.0..=1000.0, " m")?;
         let to = required(params, "params")?;
         let mut now = given(to.cast_const())?;

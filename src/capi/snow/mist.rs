@@ -14,7 +14,7 @@ use crate::context::Context;
 use crate::flow::Tiles;
 use crate::geometry::DVec3;
 use crate::snow::base_layer::BaseLayer;
-use crate::snow::mist::{Around, Grids, Mist, Source, Start, StepReport, Surroundings, Wind};
+use crate::snow::mist::{Grids, Mist, Source, Start, StepInputs, StepReport, Surroundings, Wind};
 use crate::sweep::Body;
 use crate::vdb::{AnyGrid, FloatGrid, VectorGrid};
 
@@ -110,7 +110,7 @@ impl Air {
         };
         let wind = wind.map(|_| Wind(&sample));
         let fastest = walls.fastest_near(&self.mist, sources);
-        let around = Around { sources, boundary: &boundary, fastest, wind: wind.as_ref() };
+        let around = StepInputs { sources, boundary: &boundary, fastest, wind: wind.as_ref() };
         let done = self.mist.step(ctx, &around, [time, time + dt])?;
         self.saved.take();
         Ok(done.into())

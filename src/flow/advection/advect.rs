@@ -10,14 +10,14 @@
 use rayon::prelude::*;
 
 use super::conserve;
-use super::paths::{At, Live, Paths, Ways, trace};
-use super::scheme::{Keeping, Scheme, Way};
+use super::paths::{Displacements, Live, Location, Paths, trace};
+use super::scheme::{AdvectionStep, MassConservation, Scheme};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::flow::Flow;
 use crate::flow::outer_grid::Reader;
 use crate::flow::pressure::stencil::row_of;
-use crate::flow::scratch::Room;
+use crate::flow::scratch::Scratch;
 use crate::flow::tiles::{Field, Tile, Tiles};
 use crate::flow::window::Window;
 use crate::numeric::cpu::dispatch;
@@ -34,26 +34,37 @@ impl Flow {
 
     /// The same with [`Scheme::Bounded`], with mass conservation: a density that is not negative keeps the requested share of its mass, to
     /// rounding, and what the scheme loses or gains is restored within two tiles, or farther away if the density there would have to grow
-    /// by more than a fifth at once. Mass is lost only if all of the density together would have to grow by more than that. This happens to
-    /// the last mist, thinner than `least`.
+    /// by more than a fifth at once. Mass is lost only if all of the density together would have to grow by more than that: this happens
+    /// to the last mist, thinner than `fade_below`.
     ///
     /// # Errors
     /// Cancel; the fields are then invalid.
-    pub fn advect_keeping(&mut self, ctx: &Context, dt: f64, keeping: Keeping) -> Result<()> {
-        self.carry(ctx, dt, Scheme::Bounded, Some(keeping))
+    pub fn advect_conserving(
+        &mut self,
+        ctx: &Context,
+        dt: f64,
+        conservation: MassConservation,
+    ) -> Result<()> {
+        self.carry(ctx, dt, Scheme::Bounded, Some(conservation))
     }
 
-    fn carry(&mut self, ctx: &Context, dt: f64, scheme: Scheme, keeping: Option<Keeping>) -> Result<()> {
+    fn carry(
+        &mut self,
+        ctx: &Context,
+        dt: f64,
+        scheme: Scheme,
+        conservation: Option<MassConservation>,
+    ) -> Result<()> {
         if let Some(around) = &mut self.around {
-            std::mem::swap(&mut around.room, &mut self.room);
+            std::mem::swap(&mut around.scratch_fields, &mut self.scratch_fields);
             let done = around.advect(ctx, dt, scheme);
-            std::mem::swap(&mut around.room, &mut self.room);
+            std::mem::swap(&mut around.scratch_fields, &mut self.scratch_fields);
             done?;
         }
-        let Self { tiles, velocity, density, ambient, around, room, .. } = self;
+        let Self { tiles, velocity, density, ambient, around, scratch_fields, .. } = self;
         let (scale, around) = (dt as f32 / self.cell, around.as_deref());
-        let way = Way { ambient: *ambient, scale, scheme, around, keeping };
-        advect(ctx, tiles, (velocity, density), &way, room)
+        let step = AdvectionStep { ambient: *ambient, scale, scheme, around, conservation };
+        advect(ctx, tiles, (velocity, density), &step, scratch_fields)
     }
 }
 
@@ -66,30 +77,30 @@ pub fn advect(
     ctx: &Context,
     tiles: &Tiles,
     (velocity, density): (&mut [Field; 3], &mut Field),
-    way: &Way<'_>,
-    room: &mut Room,
+    step: &AdvectionStep<'_>,
+    scratch: &mut Scratch,
 ) -> Result<()> {
-    let Way { ambient, scheme, .. } = *way;
-    let (mut back, mut ahead, [hat, below, above]) = room.paths(tiles);
-    let extents = trace(ctx, tiles, velocity, way, [&mut back, &mut ahead])?;
+    let AdvectionStep { ambient, scheme, .. } = *step;
+    let (mut back, mut ahead, [first_guess, below, above]) = scratch.paths(tiles);
+    let extents = trace(ctx, tiles, velocity, step, [&mut back, &mut ahead])?;
     let paths = Paths { tiles, back: back.map(|field| &*field), ahead: ahead.map(|field| &*field), extents };
     for axis in 0..3 {
         let outside = ambient[axis];
-        let around = way.around.map(|around| around.faces(axis));
+        let around = step.around.map(|around| around.faces(axis));
         let field = (&mut velocity[axis], outside);
-        let room = [&mut *hat, &mut *below, &mut *above];
-        carry_faces(ctx, &paths, axis, field, around.as_ref(), room, scheme)?;
+        let scratch = [&mut *first_guess, &mut *below, &mut *above];
+        carry_faces(ctx, &paths, axis, field, around.as_ref(), scratch, scheme)?;
     }
-    let wanted = way.keeping.map(|_| conserve::carried(ctx, &paths, density)).transpose()?;
-    carry_density(ctx, &paths, density, &mut hat[..tiles.active()], scheme)?;
-    if let (Some(keeping), Some(wanted)) = (way.keeping, wanted) {
-        conserve::restore(tiles, density, &wanted, keeping);
+    let wanted = step.conservation.map(|_| conserve::target_masses(ctx, &paths, density)).transpose()?;
+    carry_density(ctx, &paths, density, &mut first_guess[..tiles.active()], scheme)?;
+    if let (Some(conservation), Some(wanted)) = (step.conservation, wanted) {
+        conserve::restore(tiles, density, &wanted, conservation);
     }
     Ok(())
 }
 
-/// Advects the velocity on an axis along the paths. `hat` is scratch for the first guess, `below` and `above` for its distances from the
-/// minimum and maximum around its departure point.
+/// Advects the velocity on an axis along the paths. `first_guess` is scratch for the first guess, `below` and `above` for its distances
+/// from the minimum and maximum around its departure point.
 ///
 /// # Errors
 /// Cancel.
@@ -99,19 +110,19 @@ fn carry_faces(
     axis: usize,
     (field, outside): (&mut Field, f32),
     around: Option<&Reader<'_>>,
-    [hat, below, above]: [&mut [Tile]; 3],
+    [first_guess, below, above]: [&mut [Tile]; 3],
     scheme: Scheme,
 ) -> Result<()> {
-    let at = At::Faces(axis);
+    let at = Location::Faces(axis);
     let is_bounded = scheme == Scheme::Bounded;
     let bounds = below.par_iter_mut().zip(above.par_iter_mut());
-    let tiles = hat.par_iter_mut().zip(bounds).enumerate().with_min_len(16);
-    tiles.try_for_each_init(Window::default, |window, (slot, (hat, (below, above)))| {
+    let tiles = first_guess.par_iter_mut().zip(bounds).enumerate().with_min_len(16);
+    tiles.try_for_each_init(Window::default, |window, (slot, (first_guess, (below, above)))| {
         ctx.check()?;
         let live = paths.live(slot, at);
         if live.as_ref().is_none_or(|live| !live.is_whole()) {
             // In the rim, the guess is the velocity of the surrounding air, which has made this step already.
-            *hat = match around {
+            *first_guess = match around {
                 Some(around) if slot >= paths.tiles.active() => {
                     around.read(window, paths.tiles.coords()[slot])
                 }
@@ -121,23 +132,23 @@ fn carry_faces(
         if let Some(live) = live {
             window.fill(field, &paths.tiles.neighbours()[slot], &paths.back_span(slot, at), outside);
             let bounds = is_bounded.then_some([below, above]);
-            guess_tile(&live, &paths.ways(slot, at, &paths.back), window, hat, bounds);
+            guess_tile(&live, &paths.displacements(slot, at, &paths.back), window, first_guess, bounds);
         }
         Ok::<_, Error>(())
     })?;
     if scheme == Scheme::SemiLagrangian {
-        field.copy_from_slice(hat);
+        field.copy_from_slice(first_guess);
         return Ok(());
     }
-    let (hat, below, above) = (&*hat, &*below, &*above);
+    let (first_guess, below, above) = (&*first_guess, &*below, &*above);
     let tiles = field.par_iter_mut().enumerate().with_min_len(16);
     tiles.try_for_each_init(Window::default, |window, (slot, values)| {
         ctx.check()?;
         let Some(live) = paths.live(slot, at) else { return Ok(()) };
-        window.fill(hat, &paths.tiles.neighbours()[slot], &paths.ahead_span(slot, at), outside);
+        window.fill(first_guess, &paths.tiles.neighbours()[slot], &paths.ahead_span(slot, at), outside);
         let bounds = is_bounded.then(|| [&below[slot], &above[slot]]);
-        let guess = Guess { hat: &hat[slot], bounds };
-        correct_tile(&live, &paths.ways(slot, at, &paths.ahead), window, &guess, values);
+        let guess = Guess { values: &first_guess[slot], bounds };
+        correct_tile(&live, &paths.displacements(slot, at, &paths.ahead), window, &guess, values);
         Ok(())
     })
 }
@@ -164,76 +175,100 @@ fn carry_density(
             to.fill(0.0);
             return Ok(());
         }
-        window.fill(density, near, &paths.back_span(slot, At::Centres).for_cubic(), 0.0);
-        density_tile(&paths.ways(slot, At::Centres, &paths.back), window, scheme, to);
+        window.fill(density, near, &paths.back_span(slot, Location::Centres).for_cubic(), 0.0);
+        density_tile(&paths.displacements(slot, Location::Centres, &paths.back), window, scheme, to);
         Ok::<_, Error>(())
     })?;
     density.copy_from_slice(to);
     Ok(())
 }
 
-fn density_tile(ways: &Ways<'_>, window: &Window, scheme: Scheme, to: &mut Tile) {
-    dispatch!(density_rows(ways: &Ways<'_>, window: &Window, scheme: Scheme, to: &mut Tile))
+fn density_tile(displacements: &Displacements<'_>, window: &Window, scheme: Scheme, to: &mut Tile) {
+    dispatch!(density_rows(displacements: &Displacements<'_>, window: &Window, scheme: Scheme, to: &mut Tile))
 }
 
 #[inline(always)]
-fn density_rows(ways: &Ways<'_>, window: &Window, scheme: Scheme, to: &mut Tile) {
+fn density_rows(displacements: &Displacements<'_>, window: &Window, scheme: Scheme, to: &mut Tile) {
     for row in 0..64 {
-        let ways = ways.row(row);
+        let displacements = displacements.row(row);
         let values = match scheme {
-            Scheme::SemiLagrangian => window.sample(row, &ways),
-            Scheme::Unbounded => window.sample_cubic(row, &ways)[0],
+            Scheme::SemiLagrangian => window.sample(row, &displacements),
+            Scheme::Unbounded => window.sample_cubic(row, &displacements)[0],
             Scheme::Bounded => {
-                let [values, least, most] = window.sample_cubic(row, &ways);
-                values.max(least).min(most)
+                let [values, low, high] = window.sample_cubic(row, &displacements);
+                values.max(low).min(high)
             }
         };
         to[row * 8..][..8].copy_from_slice(&values.0);
     }
 }
 
-fn guess_tile(live: &Live, ways: &Ways<'_>, window: &Window, hat: &mut Tile, bounds: Bounds<&mut Tile>) {
-    dispatch!(guess_rows(live: &Live, ways: &Ways<'_>, window: &Window, hat: &mut Tile, bounds: Bounds<&mut Tile>))
+fn guess_tile(
+    live: &Live,
+    displacements: &Displacements<'_>,
+    window: &Window,
+    first_guess: &mut Tile,
+    bounds: Bounds<&mut Tile>,
+) {
+    dispatch!(guess_rows(live: &Live, displacements: &Displacements<'_>, window: &Window, first_guess: &mut Tile, bounds: Bounds<&mut Tile>))
 }
 
-/// The distances of values from their bounds, if they have any: from the lower ones, and from the upper ones.
+/// Distances of values from their lower and upper bounds; none for unbounded schemes.
 type Bounds<T> = Option<[T; 2]>;
 
 /// First guesses, and their bounds.
 #[inline(always)]
-fn guess_rows(live: &Live, ways: &Ways<'_>, window: &Window, hat: &mut Tile, bounds: Bounds<&mut Tile>) {
+fn guess_rows(
+    live: &Live,
+    displacements: &Displacements<'_>,
+    window: &Window,
+    first_guess: &mut Tile,
+    bounds: Bounds<&mut Tile>,
+) {
     let Some([below, above]) = bounds else {
         for row in live.rows() {
-            let values = window.sample(row, &ways.row(row));
-            hat[row * 8..][..live.lanes()].copy_from_slice(&values.0[..live.lanes()]);
+            let values = window.sample(row, &displacements.row(row));
+            first_guess[row * 8..][..live.lanes()].copy_from_slice(&values.0[..live.lanes()]);
         }
         return;
     };
     for row in live.rows() {
-        let [values, low, high] = window.sample_bounded(row, &ways.row(row));
-        hat[row * 8..][..live.lanes()].copy_from_slice(&values.0[..live.lanes()]);
+        let [values, low, high] = window.sample_bounded(row, &displacements.row(row));
+        first_guess[row * 8..][..live.lanes()].copy_from_slice(&values.0[..live.lanes()]);
         below[row * 8..][..8].copy_from_slice(&(values - low).0);
         above[row * 8..][..8].copy_from_slice(&(high - values).0);
     }
 }
 
-/// First guesses, and their bounds.
+/// First guesses of a tile, and their bounds.
 struct Guess<'a> {
-    hat: &'a Tile,
+    values: &'a Tile,
     bounds: Bounds<&'a Tile>,
 }
 
-fn correct_tile(live: &Live, ways: &Ways<'_>, window: &Window, guess: &Guess<'_>, values: &mut Tile) {
-    dispatch!(correct_rows(live: &Live, ways: &Ways<'_>, window: &Window, guess: &Guess<'_>, values: &mut Tile))
+fn correct_tile(
+    live: &Live,
+    displacements: &Displacements<'_>,
+    window: &Window,
+    guess: &Guess<'_>,
+    values: &mut Tile,
+) {
+    dispatch!(correct_rows(live: &Live, displacements: &Displacements<'_>, window: &Window, guess: &Guess<'_>, values: &mut Tile))
 }
 
 /// Corrects first guesses by half of the error of the round trip, forward and back.
 #[inline(always)]
-fn correct_rows(live: &Live, ways: &Ways<'_>, window: &Window, guess: &Guess<'_>, values: &mut Tile) {
+fn correct_rows(
+    live: &Live,
+    displacements: &Displacements<'_>,
+    window: &Window,
+    guess: &Guess<'_>,
+    values: &mut Tile,
+) {
     let rows = |tile: &Tile, row: usize| Lanes(row_of(tile, row));
     for row in live.rows() {
-        let there = window.sample(row, &ways.row(row));
-        let first = rows(guess.hat, row);
+        let there = window.sample(row, &displacements.row(row));
+        let first = rows(guess.values, row);
         let mut change = Lanes::all(0.5) * (rows(values, row) - there);
         if let Some([below, above]) = guess.bounds {
             change = limited(change, rows(below, row), rows(above, row));

@@ -2,15 +2,15 @@
 //! it was gained.
 //!
 //! Every corner of the tiles has a hat function: a weight of 1 there that falls linearly to 0 at the adjacent corners, so that all hats
-//! together weigh each point once. Each cell carries its mass along its path to a point, and thus into the eight hats around it: this is
+//! sum to 1 at each point. Each cell carries its mass along its path to a point, and thus into the eight hats around it: this is
 //! the mass that each hat should hold. After advection the hat holds a different mass. The density is then multiplied by factors that are
 //! given at the corners and linear in between, the mass that each hat should hold over the mass that it holds, so that the total mass is
-//! right to rounding and no density farther than a tile from a loss changes, unless a hat would have to grow by more than `MOST_GAIN`.
+//! right to rounding and no density farther than a tile from a loss changes, unless a hat would have to grow by more than `MAX_GAIN`.
 
 use rayon::prelude::*;
 
 use super::paths::{Extent, Paths};
-use super::scheme::Keeping;
+use super::scheme::MassConservation;
 use crate::context::Context;
 use crate::error::Result;
 use crate::flow::pressure::stencil::row_of;
@@ -21,12 +21,12 @@ use crate::numeric::lanes::Lanes;
 
 /// Largest factor of a hat, and then of all density, in a round: if nearly all the mist of a tile was cut off, its mass must not return in
 /// the remainder.
-const MOST_GAIN: f64 = 1.2;
-/// Passes in which a hat that would have to grow by more than [`MOST_GAIN`] hands the excess to the adjacent hats. The excess that remains
+const MAX_GAIN: f64 = 1.2;
+/// Passes in which a hat that would have to grow by more than [`MAX_GAIN`] hands the excess to the adjacent hats. The excess that remains
 /// after them is spread over all of the density.
 const PASSES: usize = 6;
-/// In a step a density below `least` loses this share of its difference from `least`. It fades slowly on purpose: when it ended at once,
-/// flows that differed only by rounding soon differed by as much as `least`.
+/// In a step a density below `fade_below` loses this share of its difference from it. It fades slowly on purpose: when it was removed at
+/// once, flows that differed only by rounding soon differed by as much as `fade_below`.
 const FADING: f32 = 0.125;
 /// Rounds of factors. Factors that are linear between corners correct a hat only in part where the adjacent hats need the opposite; the
 /// last round makes the sum of all hats right.
@@ -43,28 +43,28 @@ pub type Masses = [f32; HATS * HATS * HATS];
 ///
 /// # Errors
 /// Cancel.
-pub fn carried(ctx: &Context, paths: &Paths<'_>, density: &Field) -> Result<Vec<f64>> {
+pub fn target_masses(ctx: &Context, paths: &Paths<'_>, density: &Field) -> Result<Vec<f64>> {
     let of_tile = |(slot, tile): (usize, &Tile)| {
         ctx.check()?;
         let ahead = paths.ahead.map(|field| &field[slot]);
         Ok(masses(tile, Some(&ahead), &paths.extents[slot][1]))
     };
     let masses: Result<Vec<Masses>> = density.par_iter().enumerate().with_min_len(16).map(of_tile).collect();
-    Ok(in_hats(paths.tiles, &masses?))
+    Ok(hat_masses(paths.tiles, &masses?))
 }
 
 /// Scales the density by the remaining share, fades thin density and restores the mass that each hat should hold.
-pub fn restore(tiles: &Tiles, density: &mut Field, wanted: &[f64], keeping: Keeping) {
+pub fn restore(tiles: &Tiles, density: &mut Field, wanted: &[f64], conservation: MassConservation) {
     let thin_out = |value: &mut f32| {
-        let kept = *value * keeping.share;
-        *value = min(kept, max(kept - FADING * (keeping.least - kept), 0.0));
+        let kept = *value * conservation.kept_share;
+        *value = min(kept, max(kept - FADING * (conservation.fade_below - kept), 0.0));
     };
     density.par_iter_mut().with_min_len(64).for_each(|tile| tile.iter_mut().for_each(thin_out));
-    let wanted: Vec<f64> = wanted.iter().map(|mass| mass * f64::from(keeping.share)).collect();
+    let wanted: Vec<f64> = wanted.iter().map(|mass| mass * f64::from(conservation.kept_share)).collect();
     for _ in 0..ROUNDS {
         let held: Vec<Masses> =
             density.par_iter().with_min_len(16).map(|tile| masses(tile, None, &[[0.0; 2]; 3])).collect();
-        let held = in_hats(tiles, &held);
+        let held = hat_masses(tiles, &held);
         multiply(tiles, density, &factors(tiles, wanted.clone(), &held));
     }
 }
@@ -99,10 +99,10 @@ fn masses_of_rows(tile: &Tile, ahead: Option<&[&Tile; 3]>, extent: &Extent) -> M
     const CENTRES: Lanes = Lanes([0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5]);
     let zero = Lanes::all(0.0);
     // The hats that any cell reaches on each axis.
-    let ranges = extent.map(|[least, most]| {
-        let low = ((0.5 + least) / 8.0).floor() as i32 + 1;
-        let high = ((7.5 + most) / 8.0).floor() as i32 + 3;
-        low.clamp(0, 3) as usize..high.clamp(1, 4) as usize
+    let ranges = extent.map(|[min, max]| {
+        let first = ((0.5 + min) / 8.0).floor() as i32 + 1;
+        let end = ((7.5 + max) / 8.0).floor() as i32 + 3;
+        first.clamp(0, 3) as usize..end.clamp(1, 4) as usize
     });
     let weights = |at: Lanes, range: &std::ops::Range<usize>| -> [Lanes; HATS] {
         let mut weights = [zero; HATS];
@@ -124,7 +124,7 @@ fn masses_of_rows(tile: &Tile, ahead: Option<&[&Tile; 3]>, extent: &Extent) -> M
     };
     let mut sums = [zero; HATS * HATS * HATS];
     for four in 0..16 {
-        // A row and its mirror images: in an order that is the same for mirrored fields.
+        // A row and its mirror images, summed so that mirrored fields have mirrored results.
         let (x, y) = (four >> 2, four & 3);
         let rows = [[x, y], [7 - x, 7 - y], [x, 7 - y], [7 - x, y]].map(|[x, y]| x << 3 | y);
         if rows.iter().all(|row| row_of(tile, *row).iter().all(|value| *value == 0.0)) {
@@ -146,7 +146,7 @@ fn masses_of_rows(tile: &Tile, ahead: Option<&[&Tile; 3]>, extent: &Extent) -> M
 }
 
 /// The mass in each corner's hat, from that of the active tiles around it.
-fn in_hats(tiles: &Tiles, masses: &[Masses]) -> Vec<f64> {
+fn hat_masses(tiles: &Tiles, masses: &[Masses]) -> Vec<f64> {
     let holds: Vec<bool> =
         masses.par_iter().with_min_len(64).map(|masses| masses.iter().any(|mass| *mass != 0.0)).collect();
     let neighbours = tiles.neighbours();
@@ -178,7 +178,7 @@ fn factors(tiles: &Tiles, mut wanted: Vec<f64>, held: &[f64]) -> Vec<f32> {
     };
     for _ in 0..PASSES {
         let rest: Vec<f64> =
-            wanted.iter().zip(held).map(|(wanted, held)| (wanted - MOST_GAIN * held).max(0.0)).collect();
+            wanted.iter().zip(held).map(|(wanted, held)| (wanted - MAX_GAIN * held).max(0.0)).collect();
         if rest.iter().all(|rest| *rest == 0.0) {
             break;
         }
@@ -191,18 +191,18 @@ fn factors(tiles: &Tiles, mut wanted: Vec<f64>, held: &[f64]) -> Vec<f32> {
         wanted = (0..wanted.len()).into_par_iter().with_min_len(64).map(next).collect();
     }
     let factor = |(wanted, held): (&f64, &f64)| match *held > 0.0 {
-        true => exact(wanted / held, ROUNDING[0]).min(MOST_GAIN),
+        true => without_rounding(wanted / held, ROUNDING[0]).min(MAX_GAIN),
         false => 1.0,
     };
     let factors: Vec<f64> = wanted.iter().zip(held).map(factor).collect();
     let all: f64 = factors.iter().zip(held).map(|(factor, held)| factor * held).sum();
-    let rest = exact(wanted.iter().sum::<f64>() / all, ROUNDING[1]).min(MOST_GAIN);
+    let rest = without_rounding(wanted.iter().sum::<f64>() / all, ROUNDING[1]).min(MAX_GAIN);
     let rest = if rest.is_finite() { rest } else { 1.0 };
     factors.iter().map(|factor| (factor * rest) as f32).collect()
 }
 
 /// A factor, or 1 if it differs from 1 only by rounding.
-fn exact(factor: f64, rounding: f64) -> f64 {
+fn without_rounding(factor: f64, rounding: f64) -> f64 {
     if (factor - 1.0).abs() > rounding { factor } else { 1.0 }
 }
 

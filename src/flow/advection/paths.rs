@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::scheme::Way;
+use super::scheme::AdvectionStep;
 use crate::context::Context;
 use crate::error::Result;
 use crate::flow::tiles::{FACES, Field, Tile, Tiles};
@@ -15,7 +15,7 @@ pub const FARTHEST: f32 = 5.0;
 
 /// Where values are located in their cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum At {
+pub enum Location {
     /// At the centres.
     Centres,
     /// At the lower faces on an axis.
@@ -38,12 +38,12 @@ pub struct Paths<'a> {
 
 impl Paths<'_> {
     /// The values of a tile that the flow moves: all of an active tile, and in the rim the upper faces of active cells.
-    pub fn live(&self, slot: usize, at: At) -> Option<Live> {
+    pub fn live(&self, slot: usize, at: Location) -> Option<Live> {
         if slot < self.tiles.active() {
             return Some(Live { layer: None });
         }
         match at {
-            At::Faces(axis) if self.below(slot, axis) < self.tiles.active() => {
+            Location::Faces(axis) if self.below(slot, axis) < self.tiles.active() => {
                 Some(Live { layer: Some(axis) })
             }
             _ => None,
@@ -55,45 +55,46 @@ impl Paths<'_> {
     }
 
     /// The cells that the backward paths of a tile's values reach.
-    pub fn back_span(&self, slot: usize, at: At) -> Span {
+    pub fn back_span(&self, slot: usize, at: Location) -> Span {
         self.span(slot, at, 0)
     }
 
     /// The cells that the forward paths of a tile's values reach.
-    pub fn ahead_span(&self, slot: usize, at: At) -> Span {
+    pub fn ahead_span(&self, slot: usize, at: Location) -> Span {
         self.span(slot, at, 1)
     }
 
-    fn span(&self, slot: usize, at: At, side: usize) -> Span {
+    fn span(&self, slot: usize, at: Location, side: usize) -> Span {
         let below = match at {
-            At::Centres => None,
-            At::Faces(axis) => self.extents.get(self.below(slot, axis)),
+            Location::Centres => None,
+            Location::Faces(axis) => self.extents.get(self.below(slot, axis)),
         };
         let both = [self.extents.get(slot), below].into_iter().flatten().map(|extents| extents[side]);
-        let mut ways = [[f32::INFINITY, f32::NEG_INFINITY]; 3];
+        let mut displacements = [[f32::INFINITY, f32::NEG_INFINITY]; 3];
         for extent in both {
-            for (way, [least, most]) in ways.iter_mut().zip(extent) {
-                *way = [min(least, way[0]), max(most, way[1])];
+            for (displacement, [min_displacement, max_displacement]) in displacements.iter_mut().zip(extent) {
+                *displacement =
+                    [min(min_displacement, displacement[0]), max(max_displacement, displacement[1])];
             }
         }
         let mut cells = [8; 3];
-        if let (At::Faces(axis), true) = (at, slot >= self.tiles.active()) {
+        if let (Location::Faces(axis), true) = (at, slot >= self.tiles.active()) {
             cells[axis] = 1;
         }
-        Span::moved(cells, &ways)
+        Span::moved(cells, &displacements)
     }
 
     /// The displacements of a tile's values.
-    pub fn ways<'a>(&self, slot: usize, at: At, paths: &[&'a [Tile]; 3]) -> Ways<'a> {
+    pub fn displacements<'a>(&self, slot: usize, at: Location, paths: &[&'a [Tile]; 3]) -> Displacements<'a> {
         let tile = |slot: usize| {
             let [x, y, z] = paths.map(|field| field.get(slot));
             Some([x?, y?, z?])
         };
         let below = match at {
-            At::Centres => None,
-            At::Faces(axis) => tile(self.below(slot, axis)),
+            Location::Centres => None,
+            Location::Faces(axis) => tile(self.below(slot, axis)),
         };
-        Ways { at, own: tile(slot), below }
+        Displacements { at, own: tile(slot), below }
     }
 }
 
@@ -129,21 +130,21 @@ impl Live {
 
 /// The displacements of a tile's values: of its cells, or of faces, which take the mean of the two cells beside them, or the value of the
 /// only active one.
-pub struct Ways<'a> {
-    at: At,
+pub struct Displacements<'a> {
+    at: Location,
     own: Option<[&'a Tile; 3]>,
     below: Option<[&'a Tile; 3]>,
 }
 
-impl Ways<'_> {
+impl Displacements<'_> {
     /// The displacements of a row.
     #[inline(always)]
     pub fn row(&self, row: usize) -> [Lanes; 3] {
         let step = match self.at {
-            At::Centres => return rows_of(self.own, row),
-            At::Faces(2) => return self.along_rows(row),
-            At::Faces(1) => 1,
-            At::Faces(_) => 8,
+            Location::Centres => return rows_of(self.own, row),
+            Location::Faces(2) => return self.along_rows(row),
+            Location::Faces(1) => 1,
+            Location::Faces(_) => 8,
         };
         let is_first = if step == 8 { row < 8 } else { row & 7 == 0 };
         let (lower, at) = if is_first { (self.below, row + 7 * step) } else { (self.own, row - step) };
@@ -190,7 +191,7 @@ pub fn trace(
     ctx: &Context,
     tiles: &Tiles,
     velocity: &[Field; 3],
-    &Way { ambient, scale, .. }: &Way<'_>,
+    &AdvectionStep { ambient, scale, .. }: &AdvectionStep<'_>,
     [back, ahead]: [&mut [&mut [Tile]; 3]; 2],
 ) -> Result<Vec<[Extent; 2]>> {
     let reach = reach(tiles, velocity, ambient, scale);
@@ -208,15 +209,16 @@ pub fn trace(
         ctx.check()?;
         let near = &tiles.neighbours()[slot];
         // A cell's velocity is the mean of its two faces' on each axis; half the displacement reaches half as far.
-        let most: [f32; 3] = std::array::from_fn(|axis| {
+        let max_displacement: [f32; 3] = std::array::from_fn(|axis| {
             let above = reach.get(near[FACES[2 * axis + 1]] as usize).map_or(0.0, |reach| reach[axis]);
             0.5 * max(reach[slot][axis], above)
         });
         for (axis, window) in windows.iter_mut().enumerate() {
-            let mut ways = most.map(|most| [-most, most]);
+            let mut displacements =
+                max_displacement.map(|max_displacement| [-max_displacement, max_displacement]);
             // Faces lie half a cell from centres; the upper ones are read too.
-            ways[axis] = [-most[axis], most[axis] + 0.5];
-            window.fill(&velocity[axis], near, &Span::moved([8; 3], &ways), ambient[axis]);
+            displacements[axis] = [-max_displacement[axis], max_displacement[axis] + 0.5];
+            window.fill(&velocity[axis], near, &Span::moved([8; 3], &displacements), ambient[axis]);
         }
         let mut to = [a, b, c, d, e, f];
         trace_tile(windows, scale, &mut to);
@@ -230,9 +232,9 @@ pub fn trace(
 fn reach(tiles: &Tiles, velocity: &[Field; 3], ambient: [f32; 3], scale: f32) -> Vec<[f32; 3]> {
     let of_tile = |slot: usize| {
         [0, 1, 2].map(|axis| {
-            let [least, most] = extent_of(&velocity[axis][slot]);
-            let most = max(max(most, -least), ambient[axis].abs());
-            min(most * scale, FARTHEST)
+            let [min_displacement, max_displacement] = extent_of(&velocity[axis][slot]);
+            let max_displacement = max(max(max_displacement, -min_displacement), ambient[axis].abs());
+            min(max_displacement * scale, FARTHEST)
         })
     };
     (0..tiles.count()).into_par_iter().with_min_len(16).map(of_tile).collect()
@@ -261,23 +263,24 @@ fn trace_tile(windows: &[Window; 3], scale: f32, to: &mut [&mut Tile; 6]) {
 
 #[inline(always)]
 fn trace_rows(windows: &[Window; 3], scale: f32, to: &mut [&mut Tile; 6]) {
-    let most = Lanes::all(FARTHEST);
-    let least = Lanes::all(-FARTHEST);
+    let max_displacement = Lanes::all(FARTHEST);
+    let min_displacement = Lanes::all(-FARTHEST);
     for row in 0..64 {
         let (x, y) = (row >> 3, row & 7);
         let low = windows.each_ref().map(|window| window.row(x, y, 0));
         let high = [windows[0].row(x + 1, y, 0), windows[1].row(x, y + 1, 0), windows[2].row(x, y, 1)];
         let half = [0, 1, 2].map(|axis| {
-            let way = (low[axis] + high[axis]) * Lanes::all(0.5 * scale);
-            Lanes::all(0.5) * way.max(least).min(most)
+            let displacement = (low[axis] + high[axis]) * Lanes::all(0.5 * scale);
+            Lanes::all(0.5) * displacement.max(min_displacement).min(max_displacement)
         });
         for (side, sign) in [-1.0, 1.0].into_iter().enumerate() {
-            let middle = half.map(|way| way * Lanes::all(sign));
+            let middle = half.map(|displacement| displacement * Lanes::all(sign));
             for axis in 0..3 {
                 // A cell's centre is half a cell above its lower face.
                 let speed = windows[axis].sample_between(row, &middle, axis);
-                let way = (Lanes::all(sign * scale) * speed).max(least).min(most);
-                to[3 * side + axis][row * 8..][..8].copy_from_slice(&way.0);
+                let displacement =
+                    (Lanes::all(sign * scale) * speed).max(min_displacement).min(max_displacement);
+                to[3 * side + axis][row * 8..][..8].copy_from_slice(&displacement.0);
             }
         }
     }

@@ -14,24 +14,24 @@ pub enum Scheme {
     Unbounded,
 }
 
-/// How a step advects a flow.
-pub struct Way<'a> {
+/// Inputs of an advection step.
+pub struct AdvectionStep<'a> {
     /// Velocity (m/s) of the air outside all tiles.
     pub ambient: [f32; 3],
-    /// Displacement in cells of a value at 1 m/s: the time over the cell's edge (s/m).
+    /// Displacement (cells) per speed (m/s): the time over the cell's edge (s/m).
     pub scale: f32,
     pub scheme: Scheme,
     /// The surrounding air after the step.
     pub around: Option<&'a Flow>,
-    /// How the density conserves its mass; none: only as well as the scheme does.
-    pub keeping: Option<Keeping>,
+    /// How the mass of the density is conserved; none: only as well as the scheme does.
+    pub conservation: Option<MassConservation>,
 }
 
-/// What happens to a density besides advection.
+/// How the mass of an advected density is conserved.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Keeping {
+pub struct MassConservation {
     /// Share 0..=1 of the mass that remains.
-    pub share: f32,
+    pub kept_share: f32,
     /// Densities below this fade over several steps; their mass goes to neighbouring density.
-    pub least: f32,
+    pub fade_below: f32,
 }

@@ -33,7 +33,7 @@ pub struct Solved {
 }
 
 /// Maximum number of iterations.
-const MOST: usize = 200;
+const MAX_ITERATIONS: usize = 200;
 
 /// Changes the velocity (m/s, at lower faces) so that, in all cells not covered by solids, its divergence times the cell is at most
 /// `tolerance` times the largest speed. `pressure` holds the initial guess, then the solution; its values in the rim are fixed.
@@ -46,32 +46,32 @@ pub fn project(
     velocity: &mut [Field; 3],
     pressure: &mut Field,
     multigrid: &mut Multigrid,
-    [residual, guess, direction, product, spare, detour]: [&mut [Tile]; 6],
+    [residual, guess, direction, product, spare, fine_correction]: [&mut [Tile]; 6],
     tolerance: f32,
 ) -> Result<Solved> {
-    multigrid.become_of(tiles, solids);
+    multigrid.rebuild(tiles, solids);
     let fastest = max(fastest(velocity), solids.fastest());
-    let aim = tolerance * fastest;
+    let target = tolerance * fastest;
     let pockets = Pockets::find(&multigrid.finest);
     divergence(tiles, solids, velocity, guess);
     // Cells inside solids have no equation: divergence that solids cause there must not reach the coarse levels.
     multigrid.finest.clear_covered(guess);
-    pockets.level(guess);
-    pockets.level(pressure);
+    pockets.subtract_means(guess);
+    pockets.subtract_means(pressure);
     multigrid.finest.compute(pressure, |slot| Task::Residual(&guess[slot]), residual);
-    let mut solved = Solved { iterations: 0, divergence: greatest(residual), fastest };
+    let mut solved = Solved { iterations: 0, divergence: max_abs(residual), fastest };
     let mut energy = 0.0;
-    // The divergence left by a step carries over into the next one: reduce it at least once, unless it is negligible.
+    // The divergence that a step leaves adds to that of the next one: at least one iteration, unless it is negligible.
     let is_due = |solved: &Solved| match solved.iterations {
-        0 => solved.divergence > 0.01 * aim,
-        _ => solved.divergence > aim,
+        0 => solved.divergence > 0.01 * target,
+        _ => solved.divergence > target,
     };
-    while is_due(&solved) && solved.iterations < MOST {
+    while is_due(&solved) && solved.iterations < MAX_ITERATIONS {
         ctx.check()?;
-        let now = multigrid.cycle(residual, guess, [&mut *spare, &mut *detour]);
+        let now = multigrid.cycle(residual, guess, [&mut *spare, &mut *fine_correction]);
         // The new direction is made conjugate to the old one even though the preconditioner is not symmetric (Notay 2000).
         let along = if energy > 0.0 { multigrid::product(guess, product) / energy } else { 0.0 };
-        follow(direction, guess, -along as f32, solved.iterations == 0);
+        update_direction(direction, guess, -along as f32, solved.iterations == 0);
         energy = multigrid.finest.compute(direction, |_| Task::Product, product);
         if !(energy > 0.0 && now > 0.0) {
             break;
@@ -80,13 +80,13 @@ pub fn project(
         solved.divergence = advance(pressure, residual, direction, product, step);
         solved.iterations += 1;
     }
-    accelerate(tiles, solids, pressure, velocity);
+    subtract_gradient(tiles, solids, pressure, velocity);
     slip::extend(tiles, &multigrid.finest, solids, velocity);
     Ok(solved)
 }
 
-/// direction = guess + share direction.
-fn follow(direction: &mut [Tile], guess: &[Tile], share: f32, is_first: bool) {
+/// direction = guess + share direction; in the first iteration, direction = guess.
+fn update_direction(direction: &mut [Tile], guess: &[Tile], share: f32, is_first: bool) {
     direction.par_iter_mut().zip(guess).with_min_len(64).for_each(|(direction, guess)| {
         if is_first {
             *direction = *guess;
@@ -106,36 +106,36 @@ fn advance(
 ) -> f32 {
     let tiles = pressure.par_iter_mut().zip(residual).zip(direction).zip(product).with_min_len(64);
     let each = tiles.map(|(((pressure, residual), direction), product)| {
-        let mut most = [0.0f32; 8];
+        let mut largest = [0.0f32; 8];
         for cell in 0..512 {
             pressure[cell] += step * direction[cell];
             residual[cell] -= step * product[cell];
-            most[cell & 7] = max(most[cell & 7], residual[cell].abs());
+            largest[cell & 7] = max(largest[cell & 7], residual[cell].abs());
         }
-        most.into_iter().fold(0.0, max)
+        largest.into_iter().fold(0.0, max)
     });
     each.reduce(|| 0.0, max)
 }
 
 /// Largest absolute value.
-fn greatest(field: &[Tile]) -> f32 {
-    let of_tile = |tile: &Tile| tile.iter().fold(0.0, |most, value| max(most, value.abs()));
+fn max_abs(field: &[Tile]) -> f32 {
+    let of_tile = |tile: &Tile| tile.iter().fold(0.0, |largest, value| max(largest, value.abs()));
     field.par_iter().with_min_len(64).map(of_tile).reduce(|| 0.0, max)
 }
 
 /// Largest speed (m/s) on any axis.
 pub fn fastest(velocity: &[Field; 3]) -> f32 {
-    velocity.iter().map(|field| greatest(field)).fold(0.0, max)
+    velocity.iter().map(|field| max_abs(field)).fold(0.0, max)
 }
 
-/// Leading bits of a float by which speeds are binned: the exponent and seven mantissa bits.
-const LEADING: u32 = 16;
+/// Trailing bits of a float that are ignored when speeds are binned: the exponent and seven mantissa bits remain.
+const IGNORED_BITS: u32 = 16;
 
-/// Speed (m/s, rounded up to a float of these leading bits) that all but a share of the values do not exceed.
-pub fn fastest_but(velocity: &[Field; 3], share: f64) -> f32 {
-    let bin = |speed: f32| (speed.abs().to_bits() >> LEADING) as usize;
+/// Speed (m/s, rounded up to a float with [`IGNORED_BITS`] zero bits at its end) that only a share of the values exceeds.
+pub fn fastest_except(velocity: &[Field; 3], share: f64) -> f32 {
+    let bin = |speed: f32| (speed.abs().to_bits() >> IGNORED_BITS) as usize;
     let tiles = velocity.iter().map(Vec::len).sum::<usize>();
-    let none = || vec![0u32; 1 << (31 - LEADING + 1)];
+    let none = || vec![0u32; 1 << (31 - IGNORED_BITS + 1)];
     let sum = |mut a: Vec<u32>, b: Vec<u32>| {
         a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
         a
@@ -148,12 +148,12 @@ pub fn fastest_but(velocity: &[Field; 3], share: f64) -> f32 {
         counted.reduce(none, sum)
     });
     let counts = counts.fold(none(), sum);
-    let most = (share * (512 * tiles) as f64) as u64;
+    let allowed = (share * (512 * tiles) as f64) as u64;
     let mut beyond = 0;
     for (bin, count) in counts.iter().enumerate().rev() {
         beyond += u64::from(*count);
-        if beyond > most {
-            return f32::from_bits((bin as u32 + 1) << LEADING);
+        if beyond > allowed {
+            return f32::from_bits((bin as u32 + 1) << IGNORED_BITS);
         }
     }
     0.0
@@ -208,7 +208,7 @@ fn fluxes(
 }
 
 /// Subtracts the pressure gradient from the velocity; covered faces move with the solid.
-fn accelerate(tiles: &Tiles, solids: &Solids, pressure: &Field, velocity: &mut [Field; 3]) {
+fn subtract_gradient(tiles: &Tiles, solids: &Solids, pressure: &Field, velocity: &mut [Field; 3]) {
     for (axis, velocity) in velocity.iter_mut().enumerate() {
         velocity.par_iter_mut().enumerate().with_min_len(16).for_each(|(slot, speed)| {
             let below = tiles.neighbours()[slot][FACES[2 * axis]] as usize;
@@ -265,9 +265,9 @@ mod tests {
         let velocity = [field, vec![[0.25; 512]; 40], vec![[-0.5; 512]; 40]];
         assert_eq!(fastest(&velocity), 90.0);
         // Two of 61,440 faces are a share of 3.3e-5.
-        let bulk = fastest_but(&velocity, 4.0e-5);
+        let bulk = fastest_except(&velocity, 4.0e-5);
         assert!((1.5..1.52).contains(&bulk), "{bulk}");
-        assert!(fastest_but(&velocity, 2.0e-5) > 29.9 && fastest_but(&velocity, 0.0) > 89.9);
-        assert_eq!(fastest_but(&[vec![], vec![], vec![]], 0.1), 0.0);
+        assert!(fastest_except(&velocity, 2.0e-5) > 29.9 && fastest_except(&velocity, 0.0) > 89.9);
+        assert_eq!(fastest_except(&[vec![], vec![], vec![]], 0.1), 0.0);
     }
 }

@@ -10,9 +10,9 @@
 use rayon::prelude::*;
 
 use super::operator::Operator;
-use super::stencil::{Task, start};
+use super::stencil::{Task, first_sweep};
 use super::transfer::{prolong, restrict};
-use crate::flow::scratch::first;
+use crate::flow::scratch::first_tiles;
 use crate::flow::solids::Solids;
 use crate::flow::tiles::{Field, NONE, Tile, Tiles};
 
@@ -20,9 +20,9 @@ use crate::flow::tiles::{Field, NONE, Tile, Tiles};
 /// the modes that a coarser level cannot represent. At most 0.34 of these modes remains.
 const WEIGHTS: [f32; 2] = [1.731_9, 0.569_5];
 /// Pairs of sweeps on the coarsest level.
-const LAST: usize = 8;
+const COARSEST_PAIRS: usize = 8;
 /// Maximum number of levels.
-const LEVELS: usize = 7;
+const MAX_LEVELS: usize = 7;
 
 /// A level below the finest.
 #[derive(Debug, Default)]
@@ -35,8 +35,8 @@ struct Level {
     b: Field,
     x: Field,
     spare: Field,
-    /// Scratch field for a correction near solids.
-    detour: Field,
+    /// Scratch field for the correction that the next level adds near solids.
+    fine_correction: Field,
 }
 
 /// The preconditioner.
@@ -48,15 +48,15 @@ pub struct Multigrid {
 }
 
 impl Multigrid {
-    /// Rebuilds it for the cells of these tiles between solids. Reuses the fields of its levels.
-    pub fn become_of(&mut self, tiles: &Tiles, solids: &Solids) {
+    /// Rebuilds the levels for the cells of these tiles between solids. Reuses the fields of its levels.
+    pub fn rebuild(&mut self, tiles: &Tiles, solids: &Solids) {
         let is_plain = solids.is_empty() && !self.finest.has_stencils();
-        if is_plain && self.finest.tiles.is_of(tiles) {
+        if is_plain && self.finest.tiles.is_same_set(tiles) {
             return;
         }
         self.finest = Operator::new(tiles, solids);
         let mut count = 0;
-        while count + 1 < LEVELS {
+        while count + 1 < MAX_LEVELS {
             let finer = if count == 0 { &self.finest } else { &self.levels[count - 1].operator };
             if finer.tiles.active() <= 1 {
                 break;
@@ -79,8 +79,8 @@ impl Multigrid {
     }
 
     /// x = M b; returns the sum of x times b.
-    pub fn cycle(&mut self, b: &[Tile], x: &mut [Tile], room: [&mut [Tile]; 2]) -> f64 {
-        descend(&self.finest, &mut self.levels, b, x, room)
+    pub fn cycle(&mut self, b: &[Tile], x: &mut [Tile], scratch: [&mut [Tile]; 2]) -> f64 {
+        descend(&self.finest, &mut self.levels, b, x, scratch)
     }
 }
 
@@ -89,30 +89,38 @@ fn descend(
     coarser: &mut [Level],
     b: &[Tile],
     x: &mut [Tile],
-    [spare, detour]: [&mut [Tile]; 2],
+    [spare, fine_correction]: [&mut [Tile]; 2],
 ) -> f64 {
     let [first_weight, second_weight] = WEIGHTS;
-    let begin = |(slot, out): (usize, &mut Tile)| start(&b[slot], first_weight, operator.stencil(slot), out);
+    let begin =
+        |(slot, out): (usize, &mut Tile)| first_sweep(&b[slot], first_weight, operator.stencil(slot), out);
     spare.par_iter_mut().enumerate().with_min_len(64).for_each(begin);
     let mut sum = operator.compute(spare, |slot| Task::Smooth(&b[slot], second_weight), x);
     let Some((next, further)) = coarser.split_first_mut() else {
-        for _ in 1..LAST {
+        for _ in 1..COARSEST_PAIRS {
             operator.compute(x, |slot| Task::Smooth(&b[slot], first_weight), spare);
             sum = operator.compute(spare, |slot| Task::Smooth(&b[slot], second_weight), x);
         }
         return sum;
     };
-    let Level { operator: coarse, children, parents, b: below, x: correction, spare: room, detour: way } =
-        next;
+    let Level {
+        operator: coarse,
+        children,
+        parents,
+        b: below,
+        x: correction,
+        spare: scratch,
+        fine_correction: next_correction,
+    } = next;
     let count = coarse.tiles.active();
-    let way = first(way, if coarse.has_stencils() { count } else { 0 });
-    let [below, correction, room] = [below, correction, room].map(|field| first(field, count));
+    let next_correction = first_tiles(next_correction, if coarse.has_stencils() { count } else { 0 });
+    let [below, correction, scratch] = [below, correction, scratch].map(|field| first_tiles(field, count));
     restrict(operator, (b, x), children, below);
-    descend(coarse, further, below, correction, [room, way]);
+    descend(coarse, further, below, correction, [scratch, next_correction]);
     if operator.has_stencils() {
-        detour.par_iter_mut().with_min_len(64).for_each(|tile| *tile = [0.0; 512]);
-        prolong(coarse, correction, operator, parents, detour);
-        correct(operator, detour, b, x, spare);
+        fine_correction.par_iter_mut().with_min_len(64).for_each(|tile| *tile = [0.0; 512]);
+        prolong(coarse, correction, operator, parents, fine_correction);
+        correct(operator, fine_correction, b, x, spare);
     } else {
         prolong(coarse, correction, operator, parents, x);
     }
@@ -127,8 +135,8 @@ fn correct(operator: &Operator, correction: &[Tile], b: &[Tile], x: &mut [Tile],
     // The operator is symmetric: correction . L x = L correction . x.
     let gain = product(correction, b) - product(spare, x);
     let share = if energy > 0.0 { (gain / energy) as f32 } else { 0.0 };
-    x.par_iter_mut().zip(correction).with_min_len(64).for_each(|(x, way)| {
-        x.iter_mut().zip(way).for_each(|(x, way)| *x += share * way);
+    x.par_iter_mut().zip(correction).with_min_len(64).for_each(|(x, correction)| {
+        x.iter_mut().zip(correction).for_each(|(x, value)| *x += share * value);
     });
 }
 

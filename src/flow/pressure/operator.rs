@@ -85,7 +85,7 @@ impl Operator {
 
     /// A tile of a field with its neighbours and coefficients.
     pub fn near<'a>(&'a self, field: &'a [Tile], slot: usize) -> Near<'a> {
-        Near { own: &field[slot], six: self.tiles.six(field, slot), stencil: self.stencil(slot) }
+        Near { own: &field[slot], six: self.tiles.face_neighbours(field, slot), stencil: self.stencil(slot) }
     }
 
     /// Computes all tiles of `out`. Returns the sum of x times `out`, or, for a sweep, of b times `out`.
@@ -112,7 +112,7 @@ impl Operator {
         let slots: Vec<usize> = (0..coords.len()).filter(|slot| !children[*slot].iter().all(plain)).collect();
         let one = |slot: usize| self.coarse_stencil(&children[slot]);
         let mut coarse = Self::of(Tiles::new(&coords), self.level + 1, &slots, one);
-        coarse.join();
+        coarse.complete_stencils();
         (coarse, children)
     }
 
@@ -130,7 +130,7 @@ impl Operator {
             let is_solid =
                 stencil.is_some_and(|stencil| fine_cells.iter().all(|at| stencil.inverse[*at] == 0.0));
             out.outside[cell >> 6] |= u64::from(is_outside) << (cell & 63);
-            // Marks cells that do not take part, until `join` inverts the diagonal.
+            // Marks cells that do not take part, until `complete_stencils` inverts the diagonal.
             out.inverse[cell] = f32::from(u8::from(!is_outside && !is_solid));
             let Some(stencil) = stencil else { continue };
             for axis in 0..3 {
@@ -148,8 +148,8 @@ impl Operator {
     }
 
     /// Completes stencils: faces next to the outside, upper faces (the lower faces of the next tiles) and the diagonal.
-    fn join(&mut self) {
-        self.part_outside();
+    fn complete_stencils(&mut self) {
+        self.weight_outside_faces();
         let active = self.tiles.active();
         let closed = |slot: &usize| {
             let uppers = (0..3).filter_map(|axis| self.upper(*slot, axis));
@@ -183,8 +183,8 @@ impl Operator {
         slots
     }
 
-    /// Completes the faces between a cell inside and a cell outside.
-    fn part_outside(&mut self) {
+    /// Weights the faces between a cell inside and a cell outside.
+    fn weight_outside_faces(&mut self) {
         // None: the whole tile is inside.
         let outside: Vec<Option<Mask>> = (0..self.tiles.active())
             .map(|slot| self.stencil(slot).map(|stencil| stencil.outside).filter(|mask| *mask != [0; 8]))
@@ -199,7 +199,7 @@ impl Operator {
         };
         let new: Vec<usize> = (0..outside.len()).filter(borders).collect();
         self.open(&new);
-        let (slots, factor) = (self.slots(), self.nearer());
+        let (slots, factor) = (self.slots(), self.outside_factor());
         let Self { tiles, stencils, .. } = self;
         stencils.par_iter_mut().zip(&slots).for_each(|(stencil, slot)| {
             let near = &tiles.neighbours()[*slot];
@@ -223,9 +223,9 @@ impl Operator {
         });
     }
 
-    /// The factor by which the outside pressure is nearer (in cells) to the last cells than on the finer level. It is known half a finest
-    /// cell behind the last face: 2 / (1 + 2^-level), relative to the distance between two cells.
-    fn nearer(&self) -> f32 {
+    /// Factor from the finer level to this one of the weight of a face to the outside. The outside pressure is known half a finest cell
+    /// behind the last face, so that the weight is 2 / (1 + 2^-level), relative to a face between two cells.
+    fn outside_factor(&self) -> f32 {
         let share = |level: i32| 2.0 / (1.0 + 0.5f32.powi(level));
         share(self.level) / share(self.level - 1)
     }

@@ -12,7 +12,7 @@ use crate::geometry::check::topology::Sets;
 const SOLID: u16 = u16::MAX;
 
 /// The connected components of a tile.
-struct Parts {
+struct Components {
     /// Component of each cell; none: the tile is a single component.
     labels: Option<Box<[u16; 512]>>,
     count: u32,
@@ -35,35 +35,35 @@ impl Pockets {
             return Self::default();
         }
         let active = operator.tiles.active();
-        let parts: Vec<Parts> =
-            (0..active).into_par_iter().with_min_len(8).map(|slot| parts_of(operator, slot)).collect();
+        let components: Vec<Components> =
+            (0..active).into_par_iter().with_min_len(8).map(|slot| components_of(operator, slot)).collect();
         let mut first = Vec::with_capacity(active);
         let mut count = 0u32;
-        for parts in &parts {
+        for components in &components {
             first.push(count);
-            count += parts.count;
+            count += components.count;
         }
         let mut groups = Sets::new(count as usize);
         for slot in 0..active {
             for axis in 0..3 {
                 let above = operator.tiles.neighbours()[slot][FACES[2 * axis + 1]] as usize;
                 if above < active {
-                    let pair = [(first[slot], &parts[slot]), (first[above], &parts[above])];
+                    let pair = [(first[slot], &components[slot]), (first[above], &components[above])];
                     join_tiles(&mut groups, axis, pair, operator.stencil(slot));
                 }
             }
         }
         let mut is_open = vec![false; count as usize];
-        for (slot, parts) in parts.iter().enumerate() {
-            for (part, _) in parts.opens.iter().enumerate().filter(|(_, opens)| **opens) {
-                is_open[groups.root(first[slot] + part as u32) as usize] = true;
+        for (slot, components) in components.iter().enumerate() {
+            for (component, _) in components.opens.iter().enumerate().filter(|(_, opens)| **opens) {
+                is_open[groups.root(first[slot] + component as u32) as usize] = true;
             }
         }
         let mut numbers = vec![NONE; count as usize];
         let mut pockets: Vec<Vec<(u32, Option<Vec<u16>>)>> = Vec::new();
-        for (slot, parts) in parts.iter().enumerate() {
-            for part in 0..parts.count {
-                let root = groups.root(first[slot] + part) as usize;
+        for (slot, components) in components.iter().enumerate() {
+            for component in 0..components.count {
+                let root = groups.root(first[slot] + component) as usize;
                 if is_open[root] {
                     continue;
                 }
@@ -71,8 +71,8 @@ impl Pockets {
                     numbers[root] = pockets.len() as u32;
                     pockets.push(Vec::new());
                 }
-                let cells = parts.labels.as_ref().map(|labels| {
-                    (0..512u16).filter(|cell| u32::from(labels[usize::from(*cell)]) == part).collect()
+                let cells = components.labels.as_ref().map(|labels| {
+                    (0..512u16).filter(|cell| u32::from(labels[usize::from(*cell)]) == component).collect()
                 });
                 pockets[numbers[root] as usize].push((slot as u32, cells));
             }
@@ -81,7 +81,7 @@ impl Pockets {
     }
 
     /// Subtracts each pocket's mean.
-    pub fn level(&self, field: &mut [Tile]) {
+    pub fn subtract_means(&self, field: &mut [Tile]) {
         for pocket in &self.pockets {
             let (mut sum, mut count) = (0.0f64, 0usize);
             for (slot, cells) in pocket {
@@ -110,11 +110,11 @@ impl Pockets {
 }
 
 /// Finds the components of a tile by flood fill.
-fn parts_of(operator: &Operator, slot: usize) -> Parts {
+fn components_of(operator: &Operator, slot: usize) -> Components {
     let active = operator.tiles.active();
     let is_outside = FACES.map(|at| operator.tiles.neighbours()[slot][at] as usize >= active);
     let Some(stencil) = operator.stencil(slot) else {
-        return Parts { labels: None, count: 1, opens: vec![is_outside.contains(&true)] };
+        return Components { labels: None, count: 1, opens: vec![is_outside.contains(&true)] };
     };
     let mut labels = Box::new([SOLID; 512]);
     let mut opens = Vec::new();
@@ -123,9 +123,9 @@ fn parts_of(operator: &Operator, slot: usize) -> Parts {
         if labels[seed] != SOLID || stencil.inverse[seed] == 0.0 {
             continue;
         }
-        let part = opens.len() as u16;
+        let component = opens.len() as u16;
         opens.push(false);
-        labels[seed] = part;
+        labels[seed] = component;
         stack.push(seed);
         while let Some(cell) = stack.pop() {
             for (face, is_outside) in is_outside.iter().enumerate() {
@@ -135,16 +135,16 @@ fn parts_of(operator: &Operator, slot: usize) -> Parts {
                 }
                 match within(axis, is_upper, cell) {
                     Some(next) if labels[next] == SOLID && stencil.inverse[next] > 0.0 => {
-                        labels[next] = part;
+                        labels[next] = component;
                         stack.push(next);
                     }
-                    None if *is_outside => opens[usize::from(part)] = true,
+                    None if *is_outside => opens[usize::from(component)] = true,
                     _ => (),
                 }
             }
         }
     }
-    Parts { labels: Some(labels), count: opens.len() as u32, opens }
+    Components { labels: Some(labels), count: opens.len() as u32, opens }
 }
 
 /// The cell behind a face, if it is in the same tile.
@@ -167,8 +167,13 @@ fn open(stencil: &Stencil, axis: usize, is_upper: bool, cell: usize) -> f32 {
 }
 
 /// Joins the components of two tiles through the faces between them.
-fn join_tiles(groups: &mut Sets, axis: usize, [below, above]: [(u32, &Parts); 2], stencil: Option<&Stencil>) {
-    let part = |(first, parts): (u32, &Parts), cell: usize| match &parts.labels {
+fn join_tiles(
+    groups: &mut Sets,
+    axis: usize,
+    [below, above]: [(u32, &Components); 2],
+    stencil: Option<&Stencil>,
+) {
+    let component = |(first, components): (u32, &Components), cell: usize| match &components.labels {
         Some(labels) => (labels[cell] != SOLID).then(|| first + u32::from(labels[cell])),
         None => Some(first),
     };
@@ -177,7 +182,7 @@ fn join_tiles(groups: &mut Sets, axis: usize, [below, above]: [(u32, &Parts); 2]
         let low = super::operator::first(axis, at);
         let last = low + 7 * step;
         if stencil.is_none_or(|stencil| open(stencil, axis, true, last) > 0.0)
-            && let (Some(a), Some(b)) = (part(below, last), part(above, low))
+            && let (Some(a), Some(b)) = (component(below, last), component(above, low))
         {
             groups.join(a, b);
         }

@@ -44,14 +44,14 @@ impl Stencil {
             for lane in 0..8 {
                 let sum: f32 = faces.iter().map(|[low, high]| low[lane] + high[lane]).sum();
                 let cell = row * 8 + lane;
-                self.inverse[cell] = if sum > LEAST && takes_part(cell) { 1.0 / sum } else { 0.0 };
+                self.inverse[cell] = if sum > MIN_OPEN_SUM && takes_part(cell) { 1.0 / sum } else { 0.0 };
             }
         }
     }
 }
 
 /// Minimum sum of open fractions of a cell that takes part.
-const LEAST: f32 = 1.0e-4;
+const MIN_OPEN_SUM: f32 = 1.0e-4;
 
 /// A row of eight values along z.
 #[inline(always)]
@@ -59,7 +59,7 @@ pub fn row_of(tile: &Tile, row: usize) -> [f32; 8] {
     std::array::from_fn(|lane| tile[row * 8 + lane])
 }
 
-/// A mutable row of eight values along z.
+/// A row of eight values along z, as lanes.
 #[inline(always)]
 fn lanes_of(tile: &Tile, row: usize) -> Lanes {
     Lanes(row_of(tile, row))
@@ -115,7 +115,7 @@ fn compute_rows(near: Near<'_>, task: Task<'_>, out: &mut Tile) -> f64 {
     sums.0.iter().map(|sum| f64::from(*sum)).sum()
 }
 
-/// What to do with each row of L x.
+/// Receives the rows of L x.
 trait Rows {
     /// Receives a row's index, x, L x and inverse diagonal.
     fn take(&mut self, row: usize, x: Lanes, product: Lanes, inverse: Lanes);
@@ -175,13 +175,13 @@ fn each_row<R: Rows>(near: &Near<'_>, mut rows: R) -> R {
     match near.stencil {
         None => {
             for row in 0..64 {
-                let (own, product) = plain(near, row);
+                let (own, product) = open_row(near, row);
                 rows.take(row, own, product, Lanes::all(1.0 / 6.0));
             }
         }
         Some(stencil) => {
             for row in 0..64 {
-                let (own, product) = with_faces(near, stencil, row);
+                let (own, product) = partly_closed_row(near, stencil, row);
                 rows.take(row, own, product, lanes_of(&stencil.inverse, row));
             }
         }
@@ -235,7 +235,7 @@ fn around(near: &Near<'_>, row: usize, own: Lanes) -> [Lanes; 6] {
 
 /// A row of x and of L x where all faces are open. Opposite neighbours are added first, so that mirrored fields have bitwise mirrored results.
 #[inline(always)]
-fn plain(near: &Near<'_>, row: usize) -> (Lanes, Lanes) {
+fn open_row(near: &Near<'_>, row: usize) -> (Lanes, Lanes) {
     let own = lanes_of(near.own, row);
     let [left, right, down, up, back, front] = around(near, row, own);
     (own, Lanes::all(6.0) * own - ((left + right) + (down + up) + (back + front)))
@@ -243,7 +243,7 @@ fn plain(near: &Near<'_>, row: usize) -> (Lanes, Lanes) {
 
 /// The same where faces are partly closed.
 #[inline(always)]
-fn with_faces(near: &Near<'_>, stencil: &Stencil, row: usize) -> (Lanes, Lanes) {
+fn partly_closed_row(near: &Near<'_>, stencil: &Stencil, row: usize) -> (Lanes, Lanes) {
     let own = lanes_of(near.own, row);
     let [left, right, down, up, back, front] = around(near, row, own);
     let [x, y, z] = stencil.faces(row);
@@ -254,7 +254,7 @@ fn with_faces(near: &Near<'_>, stencil: &Stencil, row: usize) -> (Lanes, Lanes) 
 }
 
 /// The first sweep from x = 0: weight / diagonal b.
-pub fn start(b: &Tile, weight: f32, stencil: Option<&Stencil>, out: &mut Tile) {
+pub fn first_sweep(b: &Tile, weight: f32, stencil: Option<&Stencil>, out: &mut Tile) {
     match stencil {
         Some(stencil) => {
             for ((out, b), inverse) in out.iter_mut().zip(b).zip(&stencil.inverse) {

@@ -9,7 +9,7 @@ use crate::flow::window::{Span, Window};
 use crate::numeric::cpu::dispatch;
 
 /// Squared ratio of the cell widths, which the stencils leave out.
-const WIDER: f32 = 4.0;
+const SQUARED_RATIO: f32 = 4.0;
 
 /// The coarse right-hand side: the mean of the residual b - L x.
 pub fn restrict(fine: &Operator, (b, x): (&[Tile], &[Tile]), children: &[[u32; 8]], coarse: &mut [Tile]) {
@@ -23,7 +23,7 @@ pub fn restrict(fine: &Operator, (b, x): (&[Tile], &[Tile]), children: &[[u32; 8
             let corner = (octant >> 2) << 8 | (octant >> 1 & 1) << 5 | (octant & 1) << 2;
             for (row, means) in means.chunks_exact(4).enumerate() {
                 let to = &mut out[corner + ((row >> 2) << 6 | (row & 3) << 3)..][..4];
-                to.iter_mut().zip(means).for_each(|(to, mean)| *to = WIDER * mean);
+                to.iter_mut().zip(means).for_each(|(to, mean)| *to = SQUARED_RATIO * mean);
             }
         }
     });

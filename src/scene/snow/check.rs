@@ -14,7 +14,7 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::scene::run::Stored;
 use crate::scene::{Layer, Scene, Value};
-use crate::snow::base_layer::initial::thin;
+use crate::snow::base_layer::initial::thin_warning;
 
 /// Summary of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -51,7 +51,7 @@ pub struct Report {
 pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs, folder: Option<&Path>) -> Result<Report> {
     let mut warnings = inputs.warnings.clone();
     if let Layer::Depth(depth) = inputs.snow.layer {
-        warnings.extend(thin(depth, inputs.snow.cell));
+        warnings.extend(thin_warning(depth, inputs.snow.cell));
     }
     let relief = Relief::new(inputs);
     let mut objects = Vec::new();

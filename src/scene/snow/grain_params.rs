@@ -25,7 +25,7 @@ pub(in crate::scene::snow) fn params(scene: &Scene, cell: f64) -> Params {
         lifetime: own.find("lifetime"),
         keep_box: keep_box.map(|[a, b, c, d, e, f]| [DVec3::new(a, b, c), DVec3::new(d, e, f)]),
         sub_steps: own.find("substeps"),
-        most: own.get("max"),
+        max_grains: own.get("max"),
         seed: own.get("seed"),
     }
 }

@@ -16,7 +16,7 @@ use crate::io::particles::ply;
 use crate::io::records::input_hashes::InputHashes;
 use crate::scene::Scene;
 use crate::scene::schema::rounded;
-use crate::snow::grains::{FASTEST, Grains, Params};
+use crate::snow::grains::{Grains, MAX_SPEED, Params};
 use crate::vdb::{FloatGrid, points};
 
 /// Points that are tested as grains together.
@@ -118,15 +118,15 @@ impl Drift {
             if !velocity.iter().all(|x| x.is_finite()) {
                 return Err(format!("the velocity of point {} is not finite", point + 1));
             }
-            if velocity.iter().any(|x| x.abs() > FASTEST) {
+            if velocity.iter().any(|x| x.abs() > MAX_SPEED) {
                 return Err(format!(
-                    "the velocity of point {} has a component over {FASTEST} m/s",
+                    "the velocity of point {} has a component over {MAX_SPEED} m/s",
                     point + 1
                 ));
             }
         }
         // Their number is checked elsewhere.
-        let params = Params { most: usize::MAX, ..params };
+        let params = Params { max_grains: usize::MAX, ..params };
         let fits = |positions: &[DVec3]| Grains::new(params)?.emit(positions, &[], 0);
         for (run, positions) in self.positions.chunks(RUN).enumerate() {
             let Err(error) = fits(positions) else { continue };

@@ -87,7 +87,7 @@ impl Inputs {
             }
         };
         if let Source::Made { ground, cover } = &source {
-            initial::fits(ground, cover, snow.cell)
+            initial::check_thickness(ground, cover, snow.cell)
                 .map_err(|error| Error::argument(format!("{}: {error}", scene.path.display())))?;
         }
         let meshes = || snow.files().filter_map(|(key, path)| Some((&**path, source.mesh(key)?)));

@@ -68,12 +68,12 @@ impl Column {
 /// Column blocks that were touched, by x and z of their origin.
 pub type Columns = HashMap<[i32; 2], Column>;
 
-/// Adds a value of each voxel of a block to its column's sum, upwards.
-pub fn add_by_cell(sums: &mut [f32; CELLS], number: impl Fn(usize) -> f32) {
+/// Adds a value of each voxel of a block to the sum of its column, from the bottom up.
+pub fn add_by_cell(sums: &mut [f32; CELLS], value: impl Fn(usize) -> f32) {
     // Eight columns at a time, in the order of memory.
     for (x, sums) in sums.chunks_exact_mut(8).enumerate() {
         for y in 0..8 {
-            sums.iter_mut().enumerate().for_each(|(z, sum)| *sum += number(x << 6 | y << 3 | z));
+            sums.iter_mut().enumerate().for_each(|(z, sum)| *sum += value(x << 6 | y << 3 | z));
         }
     }
 }
@@ -99,7 +99,7 @@ pub fn heights(surface: &FloatGrid, [x, z]: [i32; 2], low: i32, high: i32) -> Re
 
 /// The blocks in which the snow differs from that before the first step.
 pub fn changed(initial: &FloatGrid, now: &FloatGrid) -> Result<HashSet<Origin>> {
-    let mut positions = HashSet::new();
+    let mut changed = HashSet::new();
     for [one, other] in [[initial, now], [now, initial]] {
         let leaves = one.leaves()?;
         let origins: Vec<Origin> = leaves.iter().map(|leaf| leaf.origin).collect();
@@ -109,18 +109,18 @@ pub fn changed(initial: &FloatGrid, now: &FloatGrid) -> Result<HashSet<Origin>> 
             Probe::Tile { .. } => true,
         });
         let differs: Vec<bool> = differs.collect();
-        positions
+        changed
             .extend(origins.iter().zip(differs).filter(|(_, differs)| *differs).map(|(origin, _)| *origin));
     }
-    Ok(positions)
+    Ok(changed)
 }
 
 /// The column blocks that contain changed blocks.
 pub fn touched(initial: &FloatGrid, changed: &HashSet<Origin>, low: i32, high: i32) -> Result<Columns> {
-    let positions: BTreeSet<[i32; 2]> = changed.iter().map(|[x, _, z]| [*x, *z]).collect();
-    positions
+    let columns: BTreeSet<[i32; 2]> = changed.iter().map(|[x, _, z]| [*x, *z]).collect();
+    columns
         .into_iter()
-        .map(|position| Ok((position, Column { original: heights(initial, position, low, high)? })))
+        .map(|column| Ok((column, Column { original: heights(initial, column, low, high)? })))
         .collect()
 }
 
@@ -143,9 +143,9 @@ pub fn volume(surface: &FloatGrid, low: [i32; 3], high: [i32; 3]) -> Result<f64>
     Ok(cells * surface.voxel_size().powi(3))
 }
 
-/// The new snow of one block, and where it differs from the old snow.
-pub struct Mark<'a> {
-    /// The snow.
+/// A block of the new snow that differs from the old one.
+pub struct ChangedBlock<'a> {
+    /// The new snow.
     pub surface: &'a BlockEdit,
     /// Voxels whose value changed.
     pub changed: &'a Mask,

@@ -8,26 +8,26 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use rayon::prelude::*;
 
 use super::columns::{CELLS, add_by_cell};
-use super::removal::{self, Edit, Scale};
+use super::subtraction::{self, Edit, Scale};
 use super::voxel_fill;
 use crate::context::Context;
 use crate::error::Result;
 use crate::numeric::blocks::{BlockEdit, Mask, Origin, VOXELS, Values, offset};
 use crate::vdb::FloatGrid;
 
-/// Distance (voxels) around an island within which distances may refer to it: a band of three cells, and one more.
+/// Distance (voxels) from an island within which its surface may be the nearest one: a band of three cells, and one more.
 const REACH: i32 = 4;
 
 type Voxel = [i32; 3];
 
 /// The snow as it will be after a step's edits.
-struct After<'a> {
+struct EditedSnow<'a> {
     edits: &'a [Edit],
     positions: HashMap<Origin, usize>,
     surface: &'a FloatGrid,
 }
 
-impl After<'_> {
+impl EditedSnow<'_> {
     fn value(&self, voxel: Voxel) -> f32 {
         match self.positions.get(&voxel.map(|at| at & !7)).map(|&index| &self.edits[index].surface) {
             Some(BlockEdit::Constant(_, value)) => *value,
@@ -36,8 +36,8 @@ impl After<'_> {
         }
     }
 
-    /// All voxels of the island around a voxel of the snow; none if there are `least` or more.
-    fn island(&self, seed: Voxel, least: usize) -> Option<Vec<Voxel>> {
+    /// All voxels of the island around a voxel of the snow; none if there are `min_voxels` or more.
+    fn island(&self, seed: Voxel, min_voxels: usize) -> Option<Vec<Voxel>> {
         let (mut voxels, mut seen) = (vec![seed], HashSet::from([seed]));
         let mut next = 0;
         while next < voxels.len() {
@@ -45,7 +45,7 @@ impl After<'_> {
             next += 1;
             for beside in neighbours(voxel) {
                 if !seen.contains(&beside) && self.value(beside) < 0.0 {
-                    if voxels.len() + 1 >= least {
+                    if voxels.len() + 1 >= min_voxels {
                         return None;
                     }
                     seen.insert(beside);
@@ -53,7 +53,7 @@ impl After<'_> {
                 }
             }
         }
-        (voxels.len() < least).then_some(voxels)
+        (voxels.len() < min_voxels).then_some(voxels)
     }
 }
 
@@ -70,7 +70,7 @@ fn neighbours(voxel: Voxel) -> impl Iterator<Item = Voxel> {
     })
 }
 
-/// Removes the islands of fewer than `least` voxels from the result of the edits; returns their number.
+/// Removes the islands of fewer than `min_voxels` voxels from the result of the edits; returns their number.
 ///
 /// # Errors
 /// Cancel; when memory runs out.
@@ -79,18 +79,19 @@ pub fn remove(
     edits: &mut Vec<Edit>,
     surface: &FloatGrid,
     scale: Scale,
-    least: usize,
+    min_voxels: usize,
 ) -> Result<usize> {
     let positions = edits.iter().enumerate().map(|(index, edit)| (edit.surface.origin(), index)).collect();
-    let after = After { edits, positions, surface };
-    let seeds: Vec<Vec<Voxel>> = edits.par_iter().map(|edit| small_parts(&edit.surface, least)).collect();
+    let after = EditedSnow { edits, positions, surface };
+    let seeds: Vec<Vec<Voxel>> =
+        edits.par_iter().map(|edit| small_components(&edit.surface, min_voxels)).collect();
     let (mut islands, mut voxels) = (Vec::new(), HashSet::new());
     for seed in seeds.concat() {
         ctx.check()?;
         if voxels.contains(&seed) {
             continue;
         }
-        if let Some(island) = after.island(seed, least) {
+        if let Some(island) = after.island(seed, min_voxels) {
             voxels.extend(island.iter().copied());
             islands.push(island);
         }
@@ -98,7 +99,7 @@ pub fn remove(
     let mut cleared: BTreeMap<Origin, BTreeMap<usize, f32>> = BTreeMap::new();
     for island in &islands {
         ctx.check()?;
-        for (voxel, value) in without(&after, island, &voxels, scale) {
+        for (voxel, value) in values_without(&after, island, &voxels, scale) {
             cleared.entry(voxel.map(|at| at & !7)).or_default().insert(index_of(voxel), value);
         }
     }
@@ -116,12 +117,12 @@ pub fn remove(
     Ok(islands.len())
 }
 
-/// A voxel of each connected component of the snow within a block that has fewer than `least` voxels.
-fn small_parts(block: &BlockEdit, least: usize) -> Vec<Voxel> {
+/// A voxel of each connected component of the snow within a block that has fewer than `min_voxels` voxels.
+fn small_components(block: &BlockEdit, min_voxels: usize) -> Vec<Voxel> {
     let BlockEdit::Dense(block) = block else {
         // All snow (at least 512 voxels), or no snow.
         return match block {
-            BlockEdit::Constant(origin, value) if *value < 0.0 && least > VOXELS => vec![*origin],
+            BlockEdit::Constant(origin, value) if *value < 0.0 && min_voxels > VOXELS => vec![*origin],
             _ => Vec::new(),
         };
     };
@@ -134,53 +135,58 @@ fn small_parts(block: &BlockEdit, least: usize) -> Vec<Voxel> {
     let mut seeds = Vec::new();
     while let Some(x) = left.iter().position(|slab| *slab != 0) {
         let bit = left[x].trailing_zeros() as usize;
-        let mut part: Mask = [0; 8];
-        part[x] = 1 << bit;
+        let mut component: Mask = [0; 8];
+        component[x] = 1 << bit;
         loop {
-            let grown = grown(&part, &left);
-            if grown == part {
+            let grown = grown(&component, &left);
+            if grown == component {
                 break;
             }
-            part = grown;
+            component = grown;
         }
-        if (part.iter().map(|slab| slab.count_ones()).sum::<u32>() as usize) < least {
+        if (component.iter().map(|slab| slab.count_ones()).sum::<u32>() as usize) < min_voxels {
             let at = [x, bit >> 3, bit & 7];
             seeds.push([0, 1, 2].map(|axis| block.origin[axis] + at[axis] as i32));
         }
-        (0..8).for_each(|slab| left[slab] &= !part[slab]);
+        (0..8).for_each(|slab| left[slab] &= !component[slab]);
     }
     seeds
 }
 
 /// A component with its neighbours within a mask of voxels: a word of a mask is one x, with y and z in its bits.
-fn grown(part: &Mask, within: &Mask) -> Mask {
+fn grown(component: &Mask, within: &Mask) -> Mask {
     const FIRST_Z: u64 = 0x0101_0101_0101_0101;
     std::array::from_fn(|x| {
-        let own = part[x];
+        let own = component[x];
         let beside = (own & !FIRST_Z) >> 1 | (own & !(FIRST_Z << 7)) << 1 | own << 8 | own >> 8;
-        let below = if x > 0 { part[x - 1] } else { 0 };
-        let above = if x < 7 { part[x + 1] } else { 0 };
+        let below = if x > 0 { component[x - 1] } else { 0 };
+        let above = if x < 7 { component[x + 1] } else { 0 };
         (own | beside | below | above) & within[x]
     })
 }
 
-/// Values (m), after all islands are removed, of the voxels of an island and of those whose nearest surface it is.
-fn without(after: &After<'_>, island: &[Voxel], gone: &HashSet<Voxel>, scale: Scale) -> Vec<(Voxel, f32)> {
+/// Values (m) after the removal of all islands, for the voxels of an island and those whose nearest surface is its surface.
+fn values_without(
+    after: &EditedSnow<'_>,
+    island: &[Voxel],
+    gone: &HashSet<Voxel>,
+    scale: Scale,
+) -> Vec<(Voxel, f32)> {
     let low = island.iter().fold(island[0], |low, v| [0, 1, 2].map(|axis| low[axis].min(v[axis])));
     let high = island.iter().fold(island[0], |high, v| [0, 1, 2].map(|axis| high[axis].max(v[axis])));
-    let near = Near::new(after, low.map(|v| v - 2 * REACH), high.map(|v| v + 2 * REACH), gone);
+    let region = Region::new(after, low.map(|v| v - 2 * REACH), high.map(|v| v + 2 * REACH), gone);
     let around: HashSet<Voxel> = island.iter().flat_map(|&voxel| cube(voxel)).collect();
     let mut around: Vec<Voxel> = around.into_iter().collect();
     around.sort_unstable();
     let cleared = |voxel: Voxel| {
-        let [to_gone, to_rest] = near.bounds(voxel, scale);
-        let value = near.value(voxel);
-        if value < 0.0 && !near.gone[near.position(voxel)] {
+        let [to_islands, to_rest] = region.bounds(voxel, scale);
+        let value = region.value(voxel);
+        if value < 0.0 && !region.gone[region.position(voxel)] {
             return None;
         }
         // At least half a cell outside, so that no part of the cell counts as filled.
         let outside = to_rest.max(0.5 * scale.cell).max(value).min(scale.background);
-        (to_gone < to_rest && outside != value).then_some((voxel, outside))
+        (to_islands < to_rest && outside != value).then_some((voxel, outside))
     };
     around.into_iter().filter_map(cleared).collect()
 }
@@ -191,16 +197,16 @@ fn cube([x, y, z]: Voxel) -> impl Iterator<Item = Voxel> {
     along(x).flat_map(move |x| along(y).flat_map(move |y| along(z).map(move |z| [x, y, z])))
 }
 
-/// Values of a box of voxels.
-struct Near {
+/// Copied values of a box of voxels, and whether each belongs to a removed island.
+struct Region {
     low: Voxel,
     size: [usize; 3],
     values: Vec<f32>,
     gone: Vec<bool>,
 }
 
-impl Near {
-    fn new(after: &After<'_>, low: Voxel, high: Voxel, gone: &HashSet<Voxel>) -> Self {
+impl Region {
+    fn new(after: &EditedSnow<'_>, low: Voxel, high: Voxel, gone: &HashSet<Voxel>) -> Self {
         let size = [0, 1, 2].map(|axis| (high[axis] - low[axis]) as usize + 1);
         let voxels = (low[0]..=high[0])
             .flat_map(|x| (low[1]..=high[1]).flat_map(move |y| (low[2]..=high[2]).map(move |z| [x, y, z])));
@@ -246,17 +252,17 @@ fn clear(edit: &mut Edit, cleared: &BTreeMap<usize, f32>, scale: Scale) {
     let origin = edit.surface.origin();
     let mut after = values_of(Some(&edit.surface), scale);
     let mut removed = values_of(edit.removed.as_ref(), scale);
-    let were = voxel_fill::parts(&after, scale.cell);
+    let fractions_before = voxel_fill::fractions(&after, scale.cell);
     for (&index, &value) in cleared {
         let before = after[index];
         removed[index] = removed[index].min(before);
         after[index] = value;
         edit.changed[index >> 6] |= 1 << (index & 63);
     }
-    let are = voxel_fill::parts(&after, scale.cell);
-    add_by_cell(&mut edit.heights, |index| were[index] - are[index]);
-    edit.surface = removal::pack(origin, after, scale);
-    let removed = removal::pack(origin, removed, scale);
+    let fractions_after = voxel_fill::fractions(&after, scale.cell);
+    add_by_cell(&mut edit.heights, |index| fractions_before[index] - fractions_after[index]);
+    edit.surface = subtraction::pack(origin, after, scale);
+    let removed = subtraction::pack(origin, removed, scale);
     edit.removed = (!matches!(removed, BlockEdit::Constant(_, value) if value > 0.0)).then_some(removed);
 }
 
@@ -274,7 +280,7 @@ mod tests {
     use crate::numeric::blocks::Block;
 
     #[test]
-    fn parts_of_a_block_are_found_by_their_size() {
+    fn components_of_a_block_are_found_by_their_size() {
         let mut values = Box::new([1.0; VOXELS]);
         // A bar of three along z, one voxel diagonally adjacent to it, and a plate of 16.
         for at in [offset(1, 1, 1), offset(1, 1, 2), offset(1, 1, 3), offset(2, 2, 4)] {
@@ -282,9 +288,9 @@ mod tests {
         }
         (0..16).for_each(|k| values[offset(4 + k / 8, 5, k % 8)] = -1.0);
         let block = BlockEdit::Dense(Block { origin: [8, 16, -8], values, mask: [0; 8] });
-        assert_eq!(small_parts(&block, 1), Vec::<Voxel>::new());
-        assert_eq!(small_parts(&block, 3), [[10, 18, -4]]);
-        assert_eq!(small_parts(&block, 4), [[9, 17, -7], [10, 18, -4]]);
-        assert_eq!(small_parts(&block, 17).len(), 3);
+        assert_eq!(small_components(&block, 1), Vec::<Voxel>::new());
+        assert_eq!(small_components(&block, 3), [[10, 18, -4]]);
+        assert_eq!(small_components(&block, 4), [[9, 17, -7], [10, 18, -4]]);
+        assert_eq!(small_components(&block, 17).len(), 3);
     }
 }

@@ -10,9 +10,9 @@ use crate::sweep::{Body, Lattice, REACH, UNITS, Window, too_far};
 /// Fractions of an interval at which poses are sampled; no steady rotation looks the same at all of them.
 const MOMENTS: [f64; 12] = [0.0, 0.07, 0.19, 0.26, 0.38, 0.45, 0.57, 0.64, 0.76, 0.83, 0.95, 1.0];
 /// Maximum number of times that an interval between two breaks of a motion is halved.
-const HALVINGS: u32 = 16;
+const MAX_HALVINGS: u32 = 16;
 
-/// The extent of the snow, for bodies that may be far from it.
+/// The extent of the snow, against which the motion of bodies is tested.
 pub struct Reach {
     lattice: Lattice,
     /// Relative to the lattice's origin voxel (cells).
@@ -21,7 +21,7 @@ pub struct Reach {
 }
 
 impl Reach {
-    /// For a sweep that is wanted in a window.
+    /// For a sweep that is clipped to a window.
     pub(super) fn new(lattice: Lattice, window: &Window) -> Self {
         let cells = |p: [i32; 3]| DVec3::from(p.map(|value| f64::from(value) / f64::from(UNITS)));
         Self { lattice, low: cells(window.min), high: cells(window.max) }
@@ -48,7 +48,7 @@ impl Reach {
         ends.push(to);
         let mut out: Vec<(f64, f64)> = Vec::new();
         for pair in ends.windows(2) {
-            self.parts(ctx, body, (pair[0], pair[1]), HALVINGS, &mut out)?;
+            self.parts(ctx, body, (pair[0], pair[1]), MAX_HALVINGS, &mut out)?;
         }
         Ok(out)
     }
@@ -79,7 +79,7 @@ impl Reach {
                 .fold((low, high), |(low, high), position| (low.inf(position), high.sup(position)));
             std::mem::swap(&mut pose, &mut before);
         }
-        // Between two samples nothing is farther from both than its motion from one to the other.
+        // Between two samples a vertex is assumed to stay within `moved`, the largest step between samples, of their box.
         let misses =
             (0..3).any(|axis| low[axis] - moved > self.high[axis] || high[axis] + moved < self.low[axis]);
         let farthest = low.abs().sup(&high.abs()).max();

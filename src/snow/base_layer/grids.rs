@@ -26,7 +26,7 @@ pub struct Changes {
     pub(super) touched: Vec<BlockEdit>,
     /// The blocks of `surface` as they were before the step.
     pub(super) before: Vec<BlockEdit>,
-    /// What the step removed (level set).
+    /// The snow that the step removed (level set).
     pub removed: FloatGrid,
     /// Snow left (m3).
     pub volume: f64,
@@ -41,7 +41,11 @@ impl Grids {
         surface.set_name("surface")?;
         surface.set_metadata(VOLUME, MetaValue::Double(volume))?;
         let cell = surface.voxel_size();
-        Ok(Self { surface, compression: plain(cell, "compression")?, touched: plain(cell, "touched")? })
+        Ok(Self {
+            surface,
+            compression: empty_named(cell, "compression")?,
+            touched: empty_named(cell, "touched")?,
+        })
     }
 
     /// A copy that shares no memory.
@@ -112,7 +116,8 @@ impl Grids {
     pub fn delta(ctx: &Context, cell: f64, half_width: f32, changes: &Changes) -> Result<Self> {
         let mut delta = Self::new(FloatGrid::level_set(cell, half_width)?, changes.volume)?;
         for (grid, edits) in delta.list_mut().into_iter().zip(changes.edits()) {
-            // A constant block becomes a leaf without active voxels: a tile could not be told from an absent block.
+            // A constant block becomes a leaf without active voxels: a tile could not be distinguished from an absent
+            // block.
             let (constant, dense): (Vec<&BlockEdit>, Vec<&BlockEdit>) =
                 edits.iter().partition(|edit| matches!(edit, BlockEdit::Constant(..)));
             let as_leaf = |edit: &&BlockEdit| match edit {
@@ -168,7 +173,7 @@ fn block_of(leaf: &Leaf<'_>) -> BlockEdit {
     BlockEdit::Dense(leaf.to_block())
 }
 
-fn plain(cell: f64, name: &str) -> Result<FloatGrid> {
+fn empty_named(cell: f64, name: &str) -> Result<FloatGrid> {
     let mut grid = FloatGrid::new(cell, 0.0)?;
     grid.set_name(name)?;
     Ok(grid)

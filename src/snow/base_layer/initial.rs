@@ -1,8 +1,8 @@
 //! The snow before anything moves: from a vertical depth, or from its top surface (thesis section 3.2).
 //!
-//! Each upward triangle of the ground and of static objects carries a prism of snow. Prisms are layers of a chain that count +1; solids
-//! have such a large negative weight that no prism fills them. A single pass of winding numbers then gives the layer, without the ghost
-//! surfaces that CSG of coincident faces leaves.
+//! Each upward triangle of the ground and of static objects carries a prism of snow. A prism adds 1 to the winding number, and a solid
+//! subtracts more than all prisms can add. A single pass of winding numbers then gives the layer, without the ghost surfaces that CSG of
+//! coincident faces leaves.
 
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -38,7 +38,7 @@ pub enum Cover {
 /// Cosine of the steepest slope that holds snow, 89 degrees. A vertical wall with rounded corner coordinates leans outward slightly: snow
 /// on it would be a film far thinner than a cell.
 const STEEPEST: f64 = 0.01745;
-/// Weight of a solid: a larger magnitude than the number of prisms that can overlap.
+/// Weight of a solid in the winding number: of larger magnitude than the number of prisms that can overlap.
 const SOLID: i32 = -(1 << 20);
 const EVERYWHERE: Window = Window { min: [i32::MIN; 3], max: [i32::MAX; 3] };
 
@@ -54,7 +54,7 @@ pub fn layer(
     cell: f64,
     half_width: f32,
 ) -> Result<FloatGrid> {
-    fits(ground, cover, cell)?;
+    check_thickness(ground, cover, cell)?;
     let ground = upright(ctx, sheet_of(ground)?);
     let statics: Vec<Sheet> = statics.iter().map(|mesh| upright(ctx, Sheet::of(mesh))).collect();
     let lattice = Lattice::near(cell, centre(&ground)?)?;
@@ -89,11 +89,11 @@ pub fn layer(
     )?;
     layer.prune_level_set()?;
     layer.set_name("surface")?;
-    let rough = match cover {
-        Cover::Depth(depth) => thin(*depth, cell),
-        Cover::Top(_) => nowhere_thick(&layer)?,
+    let warning = match cover {
+        Cover::Depth(depth) => thin_warning(*depth, cell),
+        Cover::Top(_) => thin_everywhere(&layer)?,
     };
-    if let Some(what) = rough {
+    if let Some(what) = warning {
         log::warn!("{what}");
     }
     Ok(layer)
@@ -103,8 +103,8 @@ pub fn layer(
 ///
 /// # Errors
 /// A depth or a plane of less than a cell; the message names it.
-pub fn fits(ground: &Ground, cover: &Cover, cell: f64) -> Result<()> {
-    let least = |name: &str, size: f64| {
+pub fn check_thickness(ground: &Ground, cover: &Cover, cell: f64) -> Result<()> {
+    let check = |name: &str, size: f64| {
         // Values that are not positive are rejected where they are used.
         if size > 0.0 && size < cell {
             return Err(Error::argument(format!(
@@ -115,11 +115,11 @@ pub fn fits(ground: &Ground, cover: &Cover, cell: f64) -> Result<()> {
         Ok(())
     };
     if let Cover::Depth(depth) = cover {
-        least("depth", *depth)?;
+        check("depth", *depth)?;
     }
     if let Ground::Plane { area: [x0, z0, x1, z1], .. } = ground {
-        least("the area's extent in x", x1 - x0)?;
-        least("the area's extent in z", z1 - z0)?;
+        check("the area's extent in x", x1 - x0)?;
+        check("the area's extent in z", z1 - z0)?;
     }
     Ok(())
 }
@@ -133,7 +133,7 @@ fn rounded(length: f64) -> f64 {
 }
 
 /// The warning for a vertical depth (m) of only a few cells.
-pub fn thin(depth: f64, cell: f64) -> Option<String> {
+pub fn thin_warning(depth: f64, cell: f64) -> Option<String> {
     let cells = depth / cell;
     (cells < THICK).then(|| {
         format!(
@@ -144,10 +144,10 @@ pub fn thin(depth: f64, cell: f64) -> Option<String> {
 }
 
 /// The warning for a layer that is thin everywhere.
-fn nowhere_thick(layer: &FloatGrid) -> Result<Option<String>> {
+fn thin_everywhere(layer: &FloatGrid) -> Result<Option<String>> {
     let cell = layer.voxel_size() as f32;
-    let least = |values: &[f32; 512]| values.iter().copied().fold(f32::INFINITY, f32::min);
-    let deepest = layer.leaves()?.iter().map(|leaf| least(leaf.values)).fold(f32::INFINITY, f32::min);
+    let min = |values: &[f32; 512]| values.iter().copied().fold(f32::INFINITY, f32::min);
+    let deepest = layer.leaves()?.iter().map(|leaf| min(leaf.values)).fold(f32::INFINITY, f32::min);
     // A layer of three cells has voxels at least a cell below its surface, at any position of the voxels.
     Ok((deepest > -(THICK as f32 - 1.0) / 2.0 * cell).then(|| {
         format!(
@@ -156,7 +156,7 @@ fn nowhere_thick(layer: &FloatGrid) -> Result<Option<String>> {
     }))
 }
 
-/// A mesh with 64-bit positions: the corners of a plane are exact, however far from the origin. Vertices of the same corner have the same
+/// A mesh with 64-bit positions, so that the corners of a plane are exact however far from the origin. Welded vertices have the same
 /// position.
 struct Sheet {
     positions: Vec<DVec3>,
@@ -172,7 +172,7 @@ impl Sheet {
         Self { positions, triangles: mesh.triangles }
     }
 
-    /// Its triangles that are less steep than [`STEEPEST`].
+    /// The mesh without triangles steeper than [`STEEPEST`].
     fn without_walls(&self) -> Self {
         let holds = |[a, b, c]: &[DVec3; 3]| {
             let normal = (b - a).cross(&(c - a));
@@ -226,8 +226,8 @@ fn centre(sheet: &Sheet) -> Result<DVec3> {
     Ok(sheet.positions.iter().sum::<DVec3>() / sheet.positions.len() as f64)
 }
 
-/// A mesh with its intended orientation: closed components with their faces outward, sheets with their faces upward. The context is warned
-/// of what remains ambiguous.
+/// A mesh with its intended orientation: closed components with their faces outward, sheets with their faces upward. What remains
+/// ambiguous is a warning of the context.
 fn upright(ctx: &Context, mut sheet: Sheet) -> Sheet {
     let same = coincident(sheet.positions.iter().copied());
     let mut orientation = Orientation::of(&sheet.positions, &sheet.triangles, &same, Closing::Caps);
@@ -248,28 +248,28 @@ fn upright(ctx: &Context, mut sheet: Sheet) -> Sheet {
     sheet
 }
 
-/// Prisms between two positions of each triangle that moves along its normal from the first to the second.
+/// Adds the prism that each triangle sweeps from one position to the other, along its normal; `weight` is what it adds to winding numbers.
 fn prisms(
     ctx: &Context,
     lattice: &Lattice,
     sheet: &Sheet,
     from: impl Fn(DVec3) -> DVec3,
     to: impl Fn(DVec3) -> DVec3,
-    layers: i32,
+    weight: i32,
     faces: &mut Vec<Face>,
 ) -> Result<()> {
     let topology = sheet.topology(false);
-    let first = level(lattice, &topology, sheet, from)?;
-    let last = level(lattice, &topology, sheet, to)?;
+    let first = fixed_pose(lattice, &topology, sheet, from)?;
+    let last = fixed_pose(lattice, &topology, sheet, to)?;
     let mut made = boundary(ctx, &topology, &[first, last], Weights { solid: 0, swept: 1 }, &EVERYWHERE)?;
-    made.iter_mut().for_each(|face| weigh(face, layers));
+    made.iter_mut().for_each(|face| weigh(face, weight));
     faces.extend(made);
     Ok(())
 }
 
 fn solid(ctx: &Context, lattice: &Lattice, sheet: &Sheet, faces: &mut Vec<Face>) -> Result<()> {
     let topology = sheet.topology(true);
-    let pose = level(lattice, &topology, sheet, |p| p)?;
+    let pose = fixed_pose(lattice, &topology, sheet, |p| p)?;
     faces.extend(boundary(ctx, &topology, &[pose], Weights { solid: SOLID, swept: 0 }, &EVERYWHERE)?);
     Ok(())
 }
@@ -283,7 +283,7 @@ fn weigh(face: &mut Face, factor: i32) {
     }
 }
 
-fn level(
+fn fixed_pose(
     lattice: &Lattice,
     topology: &Topology,
     sheet: &Sheet,

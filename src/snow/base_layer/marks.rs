@@ -5,7 +5,7 @@ use std::collections::{BTreeSet, HashMap};
 use rayon::prelude::*;
 
 use super::BaseLayer;
-use super::columns::{self, Column, Columns, Heights, Mark};
+use super::columns::{self, ChangedBlock, Column, Columns, Heights};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::numeric::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
@@ -14,35 +14,35 @@ use crate::vdb::Probe;
 impl BaseLayer {
     /// Heights of the column blocks that these changed blocks touch for the first time.
     pub(super) fn new_columns(&self, origins: impl Iterator<Item = Origin>) -> Result<Columns> {
-        let positions: BTreeSet<[i32; 2]> = origins.map(column_of).collect();
+        let columns: BTreeSet<[i32; 2]> = origins.map(column_of).collect();
         let new: Vec<[i32; 2]> =
-            positions.into_iter().filter(|position| !self.columns.contains_key(position)).collect();
-        let column = |position: [i32; 2]| {
-            let original = columns::heights(&self.grids.surface, position, self.low[1], self.high[1])?;
-            Ok((position, Column { original }))
+            columns.into_iter().filter(|column| !self.columns.contains_key(column)).collect();
+        let column = |column: [i32; 2]| {
+            let original = columns::heights(&self.grids.surface, column, self.low[1], self.high[1])?;
+            Ok((column, Column { original }))
         };
         new.into_par_iter().map(column).collect()
     }
 
     /// Frame numbers at the surface voxels of the changed blocks.
-    pub(super) fn touched_edits(&self, marks: &[Mark<'_>], frame: i32) -> Result<Vec<BlockEdit>> {
-        let origins: Vec<Origin> = marks.iter().map(|mark| mark.surface.origin()).collect();
+    pub(super) fn touched_edits(&self, changes: &[ChangedBlock<'_>], frame: i32) -> Result<Vec<BlockEdit>> {
+        let origins: Vec<Origin> = changes.iter().map(|change| change.surface.origin()).collect();
         let before = self.grids.touched.probe(&origins)?;
-        let edit_one = |(mark, before): (&Mark<'_>, &Probe<'_>)| {
-            let BlockEdit::Dense(surface) = mark.surface else {
-                return BlockEdit::Constant(mark.surface.origin(), 0.0);
+        let edit_one = |(change, before): (&ChangedBlock<'_>, &Probe<'_>)| {
+            let BlockEdit::Dense(surface) = change.surface else {
+                return BlockEdit::Constant(change.surface.origin(), 0.0);
             };
             let (mut values, known) = match before {
                 Probe::Leaf(leaf) => (Box::new(*leaf.values), *leaf.mask),
                 Probe::Tile { .. } => (Box::new([0.0; VOXELS]), [0; 8]),
             };
-            for index in (0..VOXELS).filter(|&index| mark.changed[index >> 6] >> (index & 63) & 1 == 1) {
+            for index in (0..VOXELS).filter(|&index| change.changed[index >> 6] >> (index & 63) & 1 == 1) {
                 values[index] = frame as f32;
             }
-            let mask: Mask = std::array::from_fn(|x| surface.mask[x] & (known[x] | mark.changed[x]));
+            let mask: Mask = std::array::from_fn(|x| surface.mask[x] & (known[x] | change.changed[x]));
             masked(surface.origin, values, mask)
         };
-        Ok(marks.par_iter().zip(&before).map(edit_one).collect())
+        Ok(changes.par_iter().zip(&before).map(edit_one).collect())
     }
 
     /// Compression at every touched surface voxel of the columns in which blocks change: `surfaces` and `touched` are those blocks after
@@ -59,7 +59,7 @@ impl BaseLayer {
             .zip(touched)
             .map(|(surface, touched)| (surface.origin(), (*surface, touched)))
             .collect();
-        let positions: BTreeSet<[i32; 2]> = now.keys().map(|origin| column_of(*origin)).collect();
+        let columns: BTreeSet<[i32; 2]> = now.keys().map(|origin| column_of(*origin)).collect();
         let cell = self.grids.surface.voxel_size() as f32;
         let levels = columns::levels(self.low[1], self.high[1]);
         let column_edits = |&[x, z]: &[i32; 2]| -> Result<Vec<BlockEdit>> {
@@ -89,8 +89,8 @@ impl BaseLayer {
             }
             Ok(out)
         };
-        let positions: Vec<[i32; 2]> = positions.into_iter().collect();
-        let parts: Vec<Vec<BlockEdit>> = positions.par_iter().map(column_edits).collect::<Result<_>>()?;
+        let columns: Vec<[i32; 2]> = columns.into_iter().collect();
+        let parts: Vec<Vec<BlockEdit>> = columns.par_iter().map(column_edits).collect::<Result<_>>()?;
         Ok(parts.into_iter().flatten().collect())
     }
 }

@@ -9,8 +9,8 @@ mod grids;
 pub mod initial;
 mod marks;
 mod noise;
-mod removal;
 mod saved_state;
+mod subtraction;
 mod sweep_region;
 pub(super) mod voxel_fill;
 
@@ -30,14 +30,14 @@ use crate::geometry::DVec3;
 use crate::numeric::blocks::{BlockEdit, DIM, Origin};
 use crate::numeric::checks::ensure;
 use crate::snow::NoiseParams;
-use crate::snow::base_layer::columns::Mark;
+use crate::snow::base_layer::columns::ChangedBlock;
 use crate::sweep::{
     Band, Body, Face, Lattice, Piece, Scratch, Settings, TOLERANCE, UNITS, Voxeliser, Window,
 };
 use crate::vdb::{FloatGrid, GridClass, MetaValue, Probe, distances};
 use columns::Columns;
 use noise::Displacement;
-use removal::{Edit, Scale};
+use subtraction::{Edit, Scale};
 use sweep_region::snow_masks;
 
 /// How objects press into the snow.
@@ -94,7 +94,7 @@ pub struct BaseLayer {
     changed: HashSet<Origin>,
     /// Fingerprint of the layer before the first step.
     initial: u128,
-    /// Box of the voxels that can hold snow.
+    /// Minimum and maximum voxel that can hold snow.
     low: [i32; 3],
     high: [i32; 3],
     half_width: f32,
@@ -106,7 +106,8 @@ impl BaseLayer {
     /// A layer whose snow is the inside of a level set.
     ///
     /// # Errors
-    /// When `surface` is not a level set, is empty or not world-fixed, its values are not distances in metres, or a parameter is out of range.
+    /// When `surface` is not a level set, is empty or not world-fixed, its values are not distances in metres, or a parameter is out of
+    /// range.
     pub fn new(ctx: &Context, surface: FloatGrid, params: Params) -> Result<Self> {
         if let Some(what) = distances::warning(&surface)? {
             return Err(Error::argument(format!("the snow's grid {what}")));
@@ -169,7 +170,7 @@ impl BaseLayer {
         &self.params
     }
 
-    /// Half width of the snow's narrow band (cells).
+    /// Half width of the narrow band (cells).
     pub fn half_width(&self) -> f32 {
         self.half_width
     }
@@ -219,7 +220,7 @@ impl BaseLayer {
         &self.changes.before
     }
 
-    /// What the last step removed (level set).
+    /// The snow that the last step removed (level set).
     pub fn removed(&self) -> &FloatGrid {
         &self.changes.removed
     }
@@ -263,12 +264,12 @@ impl BaseLayer {
         let (report, phases) = ctx.step(phases, || {
             let (ragged, ragged_faces) = self.sweep(ctx, &ragged, from, to, noise.as_ref())?;
             let (exact, exact_faces) = self.sweep(ctx, &exact, from, to, None)?;
-            let pieces = united(ragged, exact);
+            let pieces = merge_sweeps(ragged, exact);
             let mut edits = ctx.phase("subtract", || self.edits(ctx, &pieces))?;
             let crumbs = match self.min_crumb {
                 0 | 1 => 0,
-                least => ctx.phase("crumbs", || {
-                    crumbs::remove(ctx, &mut edits, &self.grids.surface, self.scale(), least)
+                min => ctx.phase("crumbs", || {
+                    crumbs::remove(ctx, &mut edits, &self.grids.surface, self.scale(), min)
                 })?,
             };
             let (changes, columns, removed_volume) =
@@ -330,7 +331,7 @@ impl BaseLayer {
         let window =
             Window { min: fixed(relative(self.low, -margin)), max: fixed(relative(self.high, margin)) };
         ctx.expect(bodies.len() + Voxeliser::PARTS);
-        let parts: Vec<Vec<Face>> = bodies
+        let faces: Vec<Vec<Face>> = bodies
             .iter()
             .map(|(index, body)| {
                 ctx.check()?;
@@ -345,11 +346,11 @@ impl BaseLayer {
             })
             .collect::<Result<_>>()?;
         let band = Band { inside: self.half_width, outside };
-        let snowy = |origins: &[Origin]| {
-            Ok(self.grids.surface.probe(origins)?.iter().map(removal::has_snow).collect())
+        let has_snow = |origins: &[Origin]| {
+            Ok(self.grids.surface.probe(origins)?.iter().map(subtraction::has_snow).collect())
         };
         let bounds = [relative(self.low, 0), relative(self.high, 0)];
-        Voxeliser::new(ctx, parts.concat(), lattice, band, bounds, snowy)
+        Voxeliser::new(ctx, faces.concat(), lattice, band, bounds, has_snow)
     }
 
     /// Faces of what a body sweeps near the snow.
@@ -363,7 +364,7 @@ impl BaseLayer {
     ) -> Result<Vec<Face>> {
         let faces = |from: f64, to: f64| body.faces(ctx, from, to, lattice, self.params.tolerance, window);
         match faces(from, to) {
-            // A vertex may be out of range: then only the times near the snow are swept.
+            // A vertex may be out of range: only the times at which the body is near the snow are then swept.
             Err(Error::Argument(_)) => {
                 let spans = Reach::new(*lattice, window).spans(ctx, body, from, to)?;
                 let parts: Vec<Vec<Face>> =
@@ -374,10 +375,10 @@ impl BaseLayer {
         }
     }
 
-    /// Distances where there is snow.
-    fn pieces(&self, ctx: &Context, voxeliser: &Voxeliser, margin: bool) -> Result<Vec<Piece>> {
+    /// Distances of the swept volume where there is snow; with `rim`, also one voxel around it.
+    fn pieces(&self, ctx: &Context, voxeliser: &Voxeliser, rim: bool) -> Result<Vec<Piece>> {
         let near = voxeliser.near_blocks();
-        let wanted = snow_masks(&self.grids.surface, &near, margin)?;
+        let wanted = snow_masks(&self.grids.surface, &near, rim)?;
         ctx.expect(near.len());
         let mut pieces: Vec<Piece> = (0..near.len())
             .into_par_iter()
@@ -402,7 +403,7 @@ impl BaseLayer {
             .zip(&snow)
             .filter_map(|(piece, snow)| {
                 ctx.advance();
-                if ctx.check().is_err() { None } else { removal::subtract(piece, snow, scale) }
+                if ctx.check().is_err() { None } else { subtraction::subtract(piece, snow, scale) }
             })
             .collect())
     }
@@ -414,9 +415,11 @@ impl BaseLayer {
         // An empty sum is -0.
         let volume = edits.iter().map(Edit::volume).sum::<f64>() * cell.powi(3) + 0.0;
         let fresh = self.new_columns(edits.iter().map(|edit| edit.surface.origin()))?;
-        let marks: Vec<Mark<'_>> =
-            edits.iter().map(|edit| Mark { surface: &edit.surface, changed: &edit.changed }).collect();
-        let touched = self.touched_edits(&marks, frame)?;
+        let blocks: Vec<ChangedBlock<'_>> = edits
+            .iter()
+            .map(|edit| ChangedBlock { surface: &edit.surface, changed: &edit.changed })
+            .collect();
+        let touched = self.touched_edits(&blocks, frame)?;
         let surfaces: Vec<&BlockEdit> = edits.iter().map(|edit| &edit.surface).collect();
         let compression = self.compression_edits(ctx, &fresh, &surfaces, &touched)?;
         let origins: Vec<Origin> = surfaces.iter().map(|edit| edit.origin()).collect();
@@ -452,14 +455,14 @@ fn half_width(surface: &FloatGrid) -> f32 {
 }
 
 /// The union of two sweeps, block by block.
-fn united(mut pieces: Vec<Piece>, others: Vec<Piece>) -> Vec<Piece> {
+fn merge_sweeps(mut pieces: Vec<Piece>, others: Vec<Piece>) -> Vec<Piece> {
     if pieces.is_empty() {
         return others;
     }
-    let positions: HashMap<Origin, usize> =
+    let indices: HashMap<Origin, usize> =
         pieces.iter().enumerate().map(|(index, p)| (p.origin(), index)).collect();
     for other in others {
-        match positions.get(&other.origin()) {
+        match indices.get(&other.origin()) {
             None => pieces.push(other),
             Some(&index) => match (&mut pieces[index], other) {
                 (Piece::Near(_, values), Piece::Near(_, others)) => {

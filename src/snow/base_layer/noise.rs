@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use fastnoise_lite::{FastNoiseLite, NoiseType};
 use rayon::prelude::*;
 
-use super::removal::{self, Scale};
+use super::subtraction::{self, Scale};
 use crate::context::Context;
 use crate::error::Result;
 use crate::numeric::blocks::{Block, BlockEdit, Origin, Values, offset};
@@ -28,7 +28,7 @@ pub struct Displacement {
     octaves: Vec<(FastNoiseLite, f32)>,
     /// Maximum displacement (cells).
     pub amplitude: f32,
-    /// Noise cells of the largest octave per voxel.
+    /// Width of a voxel in noise cells of the largest octave.
     step: f64,
 }
 
@@ -71,7 +71,7 @@ impl Displacement {
             return;
         }
         let reach = half_width + self.amplitude;
-        // The last work unit scales all of them.
+        // The last unit of progress is `normalise`.
         ctx.expect(pieces.len() + 1);
         pieces.par_iter_mut().for_each(|piece| {
             ctx.advance();
@@ -101,11 +101,11 @@ pub fn displace(ctx: &Context, grid: &mut FloatGrid, params: &NoiseParams) -> Re
     let half_width = (f64::from(grid.background()) / cell) as f32;
     // Rebuilt with a band that contains the displaced surface and three cells around it; from a mesh, whose positions are 32-bit, and
     // therefore near the world's origin.
-    let (near, moved) = near_origin(ctx, grid)?;
+    let (near, shift) = near_origin(ctx, grid)?;
     let mesh = level_set::to_mesh(ctx, near.as_ref().unwrap_or(grid), 0.0, 0.0)?;
     let settings = Settings { half_width: half_width + noise.amplitude.ceil(), ..Settings::new(cell) };
     let wide = crate::sweep::voxelise(ctx, mesh, &settings)?;
-    let back = |origin: Origin| [0, 1, 2].map(|axis| origin[axis] + moved[axis]);
+    let back = |origin: Origin| [0, 1, 2].map(|axis| origin[axis] + shift[axis]);
     let mut pieces: Vec<Piece> = wide
         .leaves()?
         .iter()
@@ -120,7 +120,7 @@ pub fn displace(ctx: &Context, grid: &mut FloatGrid, params: &NoiseParams) -> Re
     let edits: Vec<BlockEdit> = pieces
         .into_iter()
         .filter_map(|piece| match piece {
-            Piece::Near(origin, cells) => Some(removal::from_cells(origin, cells, scale)),
+            Piece::Near(origin, cells) => Some(subtraction::from_cells(origin, cells, scale)),
             Piece::Inside(_) => None,
         })
         .collect();
@@ -130,34 +130,34 @@ pub fn displace(ctx: &Context, grid: &mut FloatGrid, params: &NoiseParams) -> Re
     Ok(())
 }
 
-/// A level set on the world's lattice, moved by whole blocks so that its centre is at the origin, and its former offset from there
-/// (voxels); none if it need not be moved or is on another lattice.
+/// A copy of a level set on the world's lattice, moved by whole blocks so that its centre is at the origin, and the offset (voxels)
+/// that moves it back; none if it is there already or on another lattice.
 fn near_origin(ctx: &Context, grid: &FloatGrid) -> Result<(Option<FloatGrid>, [i32; 3])> {
     let nothing = (None, [0; 3]);
     let Some((low, high)) = grid.active_bbox().filter(|_| grid.is_world_fixed()) else { return Ok(nothing) };
-    let moved = [0, 1, 2].map(|axis| ((i64::from(low[axis]) + i64::from(high[axis])) / 2) as i32 & !7);
-    if moved == [0; 3] {
+    let shift = [0, 1, 2].map(|axis| ((i64::from(low[axis]) + i64::from(high[axis])) / 2) as i32 & !7);
+    if shift == [0; 3] {
         return Ok(nothing);
     }
     let cell = grid.voxel_size();
     let mut near = FloatGrid::level_set(cell, (f64::from(grid.background()) / cell) as f32)?;
     let leaf = |leaf: &Leaf<'_>| {
-        let origin = [0, 1, 2].map(|axis| leaf.origin[axis] - moved[axis]);
+        let origin = [0, 1, 2].map(|axis| leaf.origin[axis] - shift[axis]);
         BlockEdit::Dense(Block { origin, ..leaf.to_block() })
     };
     near.replace_blocks(ctx, &grid.leaves()?.iter().map(leaf).collect::<Vec<_>>())?;
     near.flood_fill()?;
-    Ok((Some(near), moved))
+    Ok((Some(near), shift))
 }
 
 /// Divides each value by the gradient there, so that values near the surface are distances again.
 fn normalise(pieces: &mut [Piece]) {
-    let positions: HashMap<Origin, usize> =
+    let indices: HashMap<Origin, usize> =
         pieces.iter().enumerate().map(|(index, piece)| (piece.origin(), index)).collect();
     let scaled: Vec<Option<Box<Values>>> = pieces
         .par_iter()
         .map(|piece| match piece {
-            Piece::Near(origin, values) => Some(Box::new(divided(*origin, values, pieces, &positions))),
+            Piece::Near(origin, values) => Some(Box::new(normalised(*origin, values, pieces, &indices))),
             Piece::Inside(_) => None,
         })
         .collect();
@@ -168,17 +168,17 @@ fn normalise(pieces: &mut [Piece]) {
     }
 }
 
-fn divided(origin: Origin, values: &Values, pieces: &[Piece], positions: &HashMap<Origin, usize>) -> Values {
-    let beside = |axis: usize, step: i32| {
+fn normalised(origin: Origin, values: &Values, pieces: &[Piece], indices: &HashMap<Origin, usize>) -> Values {
+    let neighbour = |axis: usize, step: i32| {
         let mut position = origin;
         position[axis] += step * 8;
-        positions.get(&position).and_then(|&index| match &pieces[index] {
+        indices.get(&position).and_then(|&index| match &pieces[index] {
             Piece::Near(_, values) => Some(values),
             Piece::Inside(_) => None,
         })
     };
     let neighbours: Vec<[Option<&Box<Values>>; 2]> =
-        (0..3).map(|axis| [beside(axis, -1), beside(axis, 1)]).collect();
+        (0..3).map(|axis| [neighbour(axis, -1), neighbour(axis, 1)]).collect();
     let mut out = *values;
     for (index, out) in out.iter_mut().enumerate() {
         let at = [index >> 6, index >> 3 & 7, index & 7];
@@ -215,14 +215,14 @@ fn upwind_squared(below: f32, above: f32, outside: bool) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::snow::noise::STEEPEST;
+    use crate::snow::noise::MAX_SLOPE;
 
     #[test]
     fn one_octave_is_nowhere_steeper_than_the_bound() {
         let mut noise = FastNoiseLite::with_seed(3);
         noise.set_noise_type(Some(NoiseType::Perlin));
         noise.set_frequency(Some(1.0));
-        let (mut steepest, step) = (0.0f32, 1e-2);
+        let (mut max_slope, step) = (0.0f32, 1e-2);
         for index in 0..400_000u32 {
             let at = [7919, 104_729, 1_299_709]
                 .map(|prime: u32| f64::from(index.wrapping_mul(prime) % 20_000) * 1e-3);
@@ -232,13 +232,13 @@ mod tests {
                 .map(|d| ((sample(d) - here) / step as f32).powi(2))
                 .iter()
                 .sum();
-            steepest = steepest.max(slope.sqrt());
+            max_slope = max_slope.max(slope.sqrt());
         }
-        assert!(f64::from(steepest) < STEEPEST, "{steepest}");
-        assert!(f64::from(steepest) > STEEPEST * 0.6, "the bound is far from tight: {steepest}");
+        assert!(f64::from(max_slope) < MAX_SLOPE, "{max_slope}");
+        assert!(f64::from(max_slope) > MAX_SLOPE * 0.6, "the bound is far from tight: {max_slope}");
     }
 
-    /// Values along x at voxels around a position, of clumps of 100 cells: neighbours always differ, but only slightly.
+    /// Displacements along a line of voxels on x, of clumps of 100 cells: adjacent voxels always differ, but only slightly.
     fn line(at: i32) -> Vec<f32> {
         let cell = 0.0075;
         let params = NoiseParams { amplitude: 2.0 * cell, size: 100.0 * cell, octaves: 1, seed: 0 };
@@ -252,12 +252,14 @@ mod tests {
         for at in [0, 160_000, 13_333_333, i32::MAX / 2, -i32::MAX / 2] {
             let line = line(at);
             let bent = line.windows(3).map(|v| (v[0] - 2.0 * v[1] + v[2]).abs());
-            let open = line.windows(3).map(|v| v.iter().all(|v| *v > 0.0));
-            let bend =
-                bent.zip(open).filter(|(_, open)| *open).fold(0.0, |most: f32, (bend, _)| most.max(bend));
+            let unclamped = line.windows(3).map(|v| v.iter().all(|v| *v > 0.0));
+            let bend = bent
+                .zip(unclamped)
+                .filter(|(_, unclamped)| *unclamped)
+                .fold(0.0, |max: f32, (bend, _)| max.max(bend));
             assert!(bend < 0.005, "at {at} it bends by {bend} of a cell");
-            let still = line.windows(2).filter(|v| v[0] > 0.05 && v[0] == v[1]).count();
-            assert!(still < 20, "at {at}, {still} voxels have their neighbour's value");
+            let equal = line.windows(2).filter(|v| v[0] > 0.05 && v[0] == v[1]).count();
+            assert!(equal < 20, "at {at}, {equal} voxels have their neighbour's value");
         }
     }
 

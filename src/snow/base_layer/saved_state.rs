@@ -54,10 +54,10 @@ impl BaseLayer {
                     Ok(pack(&origins[range.clone()], surface, touched, background))
                 })
                 .collect::<Result<_>>()?;
-            let mut bytes = self.header(&groups.iter().map(Vec::len).sum::<usize>());
+            let mut bytes = self.header(groups.iter().map(Vec::len).sum());
             groups.iter().for_each(|group| bytes.extend_from_slice(group));
-            let seal = seal(&bytes);
-            bytes[HEADER - 16..HEADER].copy_from_slice(&seal);
+            let checksum = checksum(&bytes);
+            bytes[HEADER - 16..HEADER].copy_from_slice(&checksum);
             Ok(bytes)
         })
     }
@@ -74,7 +74,7 @@ impl BaseLayer {
     /// # Errors
     /// As [`BaseLayer::new`]; bytes that are damaged, of another version, or of another initial layer.
     pub fn restore(ctx: &Context, initial: FloatGrid, params: Params, state: &[u8]) -> Result<Self> {
-        // Too few bytes are rejected below.
+        // Too few bytes are rejected by `unpack`.
         let volume = state.get(44..52).map(|bytes| f64::from_le_bytes(array(bytes)));
         let mut layer = Self::with_volume(ctx, initial, params, volume)?;
         let (surface, touched) = ctx.phase("unpack", || layer.unpack(ctx, state))?;
@@ -93,7 +93,7 @@ impl BaseLayer {
 
     /// Offsets: 0 magic, 8 version, 12 blocks, 16 cell, 24 background, 28 initial layer, 44 volume, 52 number of bytes that follow, 60
     /// unused, 64 checksum.
-    fn header(&self, following: &usize) -> Vec<u8> {
+    fn header(&self, following: usize) -> Vec<u8> {
         let mut out = Vec::with_capacity(HEADER + following);
         out.extend(MAGIC);
         out.extend(VERSION.to_le_bytes());
@@ -102,7 +102,7 @@ impl BaseLayer {
         out.extend(self.grids.surface.background().to_le_bytes());
         out.extend(self.initial.to_le_bytes());
         out.extend(self.changes.volume.to_le_bytes());
-        out.extend((*following as u64).to_le_bytes());
+        out.extend((following as u64).to_le_bytes());
         out.resize(HEADER, 0);
         out
     }
@@ -118,7 +118,7 @@ impl BaseLayer {
             return Err(refused(&format!("has format {version}, this library reads {VERSION}")));
         }
         let following = u64::from_le_bytes(array(&state[52..60]));
-        if following != (state.len() - HEADER) as u64 || seal(state) != state[HEADER - 16..HEADER] {
+        if following != (state.len() - HEADER) as u64 || checksum(state) != state[HEADER - 16..HEADER] {
             return Err(refused("is cut short or damaged"));
         }
         let same = state[16..24] == self.grids.surface.voxel_size().to_le_bytes()
@@ -131,7 +131,7 @@ impl BaseLayer {
         let mut reader = Reader(&state[HEADER..]);
         let mut groups = Vec::new();
         while !reader.0.is_empty() {
-            let [blocks, length] = [reader.number(), reader.number()].map(|n| n.map(|n| n as usize));
+            let [blocks, length] = [reader.u32(), reader.u32()].map(|n| n.map(|n| n as usize));
             let packed = reader.take(length.ok_or_else(damaged)?).ok_or_else(damaged)?;
             groups.push((blocks.filter(|&blocks| blocks <= GROUP).ok_or_else(damaged)?, packed));
         }
@@ -149,7 +149,7 @@ impl BaseLayer {
     }
 }
 
-/// Identifies a layer: a hash of its leaves.
+/// Hash of a layer's leaves, which identifies it.
 pub fn fingerprint(surface: &FloatGrid) -> Result<u128> {
     let leaf = |leaf: &Leaf<'_>| {
         let mut bytes = [0u8; 12 + 4 * VOXELS + 64];
@@ -172,8 +172,8 @@ pub fn fingerprint(surface: &FloatGrid) -> Result<u128> {
     Ok(xxh3_128(&leaves.iter().flat_map(|hash| hash.to_le_bytes()).collect::<Vec<u8>>()))
 }
 
-/// Hash of everything except the hash itself.
-fn seal(state: &[u8]) -> [u8; 16] {
+/// Hash of the state except its own 16 bytes.
+fn checksum(state: &[u8]) -> [u8; 16] {
     let mut hash = Xxh3::new();
     hash.update(&state[..HEADER - 16]);
     hash.update(&state[HEADER..]);
@@ -245,7 +245,7 @@ fn is_band(leaf: &Leaf<'_>, background: f32) -> bool {
     })
 }
 
-/// Indices of the voxels that a mask has, ascending.
+/// Indices of the bits that are set in a mask, ascending.
 fn active(mask: &Mask) -> impl Iterator<Item = usize> + '_ {
     mask.iter().enumerate().flat_map(|(x, &word)| {
         std::iter::successors((word != 0).then_some(word), |word| {
@@ -263,7 +263,7 @@ fn read_group(
 ) -> Option<(Vec<BlockEdit>, Vec<BlockEdit>)> {
     let heads: Vec<(Origin, u8)> = (0..blocks)
         .map(|_| {
-            let origin = [reader.number()?, reader.number()?, reader.number()?].map(|index| index as i32);
+            let origin = [reader.u32()?, reader.u32()?, reader.u32()?].map(|index| index as i32);
             Some((origin, reader.take(1)?[0]))
         })
         .collect::<Option<_>>()?;
@@ -340,7 +340,7 @@ impl<'a> Reader<'a> {
         Some(taken)
     }
 
-    fn number(&mut self) -> Option<u32> {
+    fn u32(&mut self) -> Option<u32> {
         Some(u32::from_le_bytes(array(self.take(4)?)))
     }
 

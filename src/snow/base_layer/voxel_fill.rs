@@ -6,46 +6,46 @@
 
 use crate::numeric::blocks::Values;
 
-/// Distance (cells) from the centre beyond which a surface with an edge fills a negligible part of a voxel.
-const FAR: f32 = 0.75;
-/// Second difference (cells) along an axis from which on there is an edge.
-const EDGE: f32 = 0.1;
+/// Maximum distance (cells) from the centre at which an edge of the surface matters to a voxel's fraction.
+const MAX_DISTANCE: f32 = 0.75;
+/// Minimum second difference (cells) along an axis at an edge.
+const MIN_BEND: f32 = 0.1;
 /// Parts of a voxel's edge, and their centres (cells from the centre of the voxel).
 const PARTS: usize = 4;
 const CENTRES: [f32; PARTS] = [-0.375, -0.125, 0.125, 0.375];
-/// Assumed change of slope beyond the border of a block, where there may be an edge outside the block: chosen so that the errors for edges
-/// at random positions have a mean near 0.
-const UNSEEN: f32 = 0.15;
+/// Assumed magnitude of the change of slope beyond the border of a block, where an edge outside the block may be: chosen so that the errors
+/// for edges at random positions have a mean near 0.
+const UNSEEN_BEND: f32 = 0.15;
 /// Tolerance for the squared gradient of a plane, which should be 1.
-const STEEP: f32 = 0.05;
+const GRADIENT_TOLERANCE: f32 = 0.05;
 /// Sentinel: a value that is not known.
 const UNKNOWN: f32 = f32::NAN;
 
 /// The filled fraction 0..=1 of each voxel, from distances (m) with cells of `cell` m. It depends only on the block, so that a step removes
 /// exactly the difference of the fractions before and after it.
-pub(in crate::snow) fn parts(values: &Values, cell: f32) -> Values {
+pub(in crate::snow) fn fractions(values: &Values, cell: f32) -> Values {
     let mut out = values.map(|value| filled(value, cell));
-    for (index, part) in out.iter_mut().enumerate() {
-        if values[index].abs() < FAR * cell {
+    for (index, fraction) in out.iter_mut().enumerate() {
+        if values[index].abs() < MAX_DISTANCE * cell {
             let at = [index >> 6, index >> 3 & 7, index & 7];
-            let [bend, most] = bends(values, at);
-            if most > EDGE * cell {
-                *part = reconstructed(values, at, cell, UNSEEN * bend.signum());
+            let [bend, max] = second_differences(values, at);
+            if max > MIN_BEND * cell {
+                *fraction = reconstructed(values, at, cell, UNSEEN_BEND * bend.signum());
             }
         }
     }
     out
 }
 
-/// Sum of [`parts`].
+/// Sum of [`fractions`].
 pub(in crate::snow) fn volume(values: &Values, cell: f32) -> f64 {
-    parts(values, cell).iter().map(|part| f64::from(*part)).sum()
+    fractions(values, cell).iter().map(|fraction| f64::from(*fraction)).sum()
 }
 
 /// Second differences (m) around a voxel, within the block: the sum over the three axes, positive where the solid is convex, and the
 /// maximum magnitude.
-fn bends(values: &Values, at: [usize; 3]) -> [f32; 2] {
-    let (mut sum, mut most) = (0.0f32, 0.0f32);
+fn second_differences(values: &Values, at: [usize; 3]) -> [f32; 2] {
+    let (mut sum, mut max) = (0.0f32, 0.0f32);
     for axis in 0..3 {
         let step = 64 >> (3 * axis);
         let mut middle = at;
@@ -53,9 +53,9 @@ fn bends(values: &Values, at: [usize; 3]) -> [f32; 2] {
         let index = middle[0] << 6 | middle[1] << 3 | middle[2];
         let second = values[index - step] + values[index + step] - 2.0 * values[index];
         sum += second;
-        most = most.max(second.abs());
+        max = max.max(second.abs());
     }
-    [sum, most]
+    [sum, max]
 }
 
 /// The filled fraction of a voxel, from the level set inside it. `unseen`: the assumed change of slope beyond the border.
@@ -94,7 +94,8 @@ fn reconstructed(values: &Values, at: [usize; 3], cell: f32, unseen: f32) -> f32
         let mut inside = refined(line);
         if outward != 0.0 {
             let slope = if outward > 0.0 { line[2] - line[1] } else { line[2] - line[3] };
-            let better = is_only_border.then(|| behind_border(&layers[2], [first, second], slope)).flatten();
+            let better =
+                is_only_border.then(|| slope_beyond_border(&layers[2], [first, second], slope)).flatten();
             for (value, centre) in inside.iter_mut().zip(CENTRES) {
                 let off = (centre * outward).max(0.0);
                 if let (true, Some(slope)) = (off > 0.0, better) {
@@ -108,9 +109,13 @@ fn reconstructed(values: &Values, at: [usize; 3], cell: f32, unseen: f32) -> f32
     sum / (PARTS * PARTS * PARTS) as f32
 }
 
-/// The slope (1) beyond the border, from the values in the voxel's layer there: the gradient of distances has length 1. None if the slope
-/// before the border is consistent.
-fn behind_border(layer: &[[f32; PARTS]; PARTS], [first, second]: [usize; 2], slope: f32) -> Option<f32> {
+/// The slope beyond the border (dimensionless), from the values in the voxel's layer there: the gradient of distances has length 1. None if
+/// the slope before the border is consistent.
+fn slope_beyond_border(
+    layer: &[[f32; PARTS]; PARTS],
+    [first, second]: [usize; 2],
+    slope: f32,
+) -> Option<f32> {
     if slope.abs() < 0.02 {
         return None;
     }
@@ -123,7 +128,7 @@ fn behind_border(layer: &[[f32; PARTS]; PARTS], [first, second]: [usize; 2], slo
     for a in along_first.iter().flatten() {
         for b in along_second.iter().flatten() {
             let square = a * a + b * b;
-            if (square + slope * slope - 1.0).abs() < STEEP {
+            if (square + slope * slope - 1.0).abs() < GRADIENT_TOLERANCE {
                 return None;
             }
             sum += (1.0 - square).max(0.0).sqrt();
@@ -144,7 +149,7 @@ fn refined([far_below, below, own, above, far_above]: [f32; 5]) -> [f32; PARTS] 
     ]
 }
 
-/// The value at a distance (cells) from a voxel towards the next one; `far` is the one beyond that, and `back` the one on the other side.
+/// The value at a distance (cells) from a voxel towards `next`; `far` is the voxel after `next`, and `back` the one on the other side.
 fn beside(own: f32, [next, far]: [f32; 2], back: f32, distance: f32) -> f32 {
     if next.is_nan() {
         return if back.is_nan() { own } else { own + (own - back) * distance };
@@ -193,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn flat_surfaces_fill_what_their_distance_says() {
+    fn flat_surfaces_fill_exact_fractions() {
         for step in 0..20 {
             let height = 3.0 + 0.1 * step as f32;
             let plane = block(0.02, |[_, y, _]| y - height);
@@ -202,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn edges_that_a_block_shows_whole_are_right() {
+    fn straight_edges_inside_a_block_are_right() {
         // The edge of a layer, and of a pit with vertical walls, at random positions; some of them rotated about y.
         let (mut worst, mut worst_of_centres) = (0.0f32, 0.0f32);
         for n in 0..90 {
@@ -219,8 +224,10 @@ mod tests {
                 let inner = |index: usize| {
                     [index >> 6, index >> 3 & 7, index & 7].iter().all(|at| (2..6).contains(at))
                 };
-                let sum = |parts: &Values| (0..512).filter(|at| inner(*at)).map(|at| parts[at]).sum::<f32>();
-                let off = sum(&parts(&values, 1.0)) / 4.0 - area;
+                let sum = |fractions: &Values| {
+                    (0..512).filter(|at| inner(*at)).map(|at| fractions[at]).sum::<f32>()
+                };
+                let off = sum(&fractions(&values, 1.0)) / 4.0 - area;
                 let of_centres = sum(&values.map(|value| filled(value, 1.0))) / 4.0 - area;
                 worst = worst.max(off.abs());
                 worst_of_centres = worst_of_centres.max(of_centres.abs());
@@ -231,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn edges_and_corners_are_right_on_an_average_and_nowhere_far_off() {
+    fn corners_are_right_on_average_and_nowhere_far_off() {
         // The corner of a box, at random positions in its voxel.
         let (mut sum, mut worst, mut centres) = (0.0, 0.0f64, 0.0f64);
         const COUNT: u32 = 200;

@@ -2,17 +2,16 @@
 
 use rayon::prelude::*;
 
-use super::colliders::field::Seen;
+use super::colliders::field::CachedField;
 use super::colliders::renewal;
 use super::colliders::search::{Scratch, Search, Travel};
 pub use super::colliders::set::{Colliders, Floor, Pose};
 pub use super::colliders::shell::Shell;
 use super::colliders::touch::{FIRST_SHELL, Touch};
 pub use super::params::Division;
-use super::solver::contacts::MOST as MOST_GRAINS;
-use crate::snow::grains::solver::pairs::Held;
-
-use super::solver::layout::{Layout, SUB_STEPS_AHEAD, holds, locate, order, settle, world};
+use super::solver::contacts::MAX_GRAINS;
+use super::solver::layout::{Layout, SUB_STEPS_AHEAD, is_in_range, locate, order, settle, world};
+use super::solver::pairs::PairImpulse;
 use super::solver::rows::{Row, Shared, V, norm};
 use super::solver::solve::{Motion, sub_step};
 use super::solver::{rest, trapped};
@@ -20,7 +19,7 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::numeric::checks::ensure;
-use crate::snow::grains::solver::blocks::{At, NONE};
+use crate::snow::grains::solver::blocks::{BlockIndex, NONE};
 use crate::snow::grains::solver::collide::Coefficients;
 
 /// Grains between two steps.
@@ -30,9 +29,9 @@ pub struct Heap {
     pub(super) rows: Vec<Row>,
     pub(super) ids: Vec<u32>,
     /// Block index of each.
-    pub(super) at: Vec<At>,
+    pub(super) at: Vec<BlockIndex>,
     /// Impulses of pairs.
-    pub(super) held: Vec<Held>,
+    pub(super) pair_impulses: Vec<PairImpulse>,
     /// Touches, sorted by slot and collider.
     pub(super) touches: Vec<Touch>,
     /// Identities of the grains trapped at the end of the last step, ascending.
@@ -43,8 +42,8 @@ impl Heap {
     /// No grains yet; they will have this diameter (m).
     pub fn new(diameter: f64) -> Self {
         let (rows, ids, at) = (Vec::new(), Vec::new(), Vec::new());
-        let (held, touches, trapped) = Default::default();
-        Self { diameter, rows, ids, at, held, touches, trapped }
+        let (pair_impulses, touches, trapped) = Default::default();
+        Self { diameter, rows, ids, at, pair_impulses, touches, trapped }
     }
 
     /// Count of grains.
@@ -63,17 +62,17 @@ impl Heap {
     /// A position out of range; too many grains.
     pub fn add(&mut self, id: u32, position: DVec3, velocity: V) -> Result<()> {
         let (at, position) = locate(position, self.diameter);
-        ensure(holds(at), "a grain is too far from the origin")?;
-        if self.rows.len() >= MOST_GRAINS {
-            return Err(Error::argument(format!("there are more than {MOST_GRAINS} grains")));
+        ensure(is_in_range(at), "a grain is too far from the origin")?;
+        if self.rows.len() >= MAX_GRAINS {
+            return Err(Error::argument(format!("there are more than {MAX_GRAINS} grains")));
         }
-        self.rows.push(Row { position, hold: 1.0, velocity, since: position, ..Row::default() });
+        self.rows.push(Row { position, mass_state: 1.0, velocity, reference: position, ..Row::default() });
         self.ids.push(id);
         self.at.push(at);
         Ok(())
     }
 
-    /// Removes the grains for whose identity and position (m) `keeps` returns false.
+    /// Removes the grains for which `keeps`, given identity and position (m), returns false.
     pub fn retain(&mut self, keeps: impl Fn(u32, DVec3) -> bool + Sync) {
         let is_kept = |slot: &u32| {
             let slot = *slot as usize;
@@ -81,17 +80,17 @@ impl Heap {
         };
         let kept: Vec<u32> = (0..self.rows.len() as u32).into_par_iter().filter(is_kept).collect();
         if kept.len() < self.rows.len() {
-            self.keep(&kept);
+            self.reorder(&kept);
         }
     }
 
-    /// Wakes the grains for whose position (m) `wakes` returns true.
+    /// Wakes the grains for which `wakes`, given the position (m), returns true.
     pub fn wake(&mut self, wakes: impl Fn(DVec3) -> bool + Sync) {
         let diameter = self.diameter;
         self.rows.par_iter_mut().zip(&self.at).for_each(|(row, at)| {
             if wakes(world(*at, row.position, diameter)) {
                 rest::wake(row);
-                rest::begin_again(row);
+                rest::restart_wait(row);
             }
         });
     }
@@ -124,7 +123,7 @@ impl Heap {
     }
 
     /// Positions as a block and a position within it (diameters).
-    pub fn located(&self) -> impl Iterator<Item = (At, V)> + '_ {
+    pub fn located(&self) -> impl Iterator<Item = (BlockIndex, V)> + '_ {
         self.rows.iter().zip(&self.at).map(|(row, at)| (*at, row.position))
     }
 
@@ -159,13 +158,13 @@ impl Heap {
             shell.collider = number;
         }
         let mut pose = Vec::new();
-        follow(&mut colliders.shells, 0.0, &mut pose)?;
-        self.make_room(ctx, colliders, MOST_BEFORE)?;
+        advance_shells(&mut colliders.shells, 0.0, &mut pose)?;
+        self.make_room(ctx, colliders, MAX_IN_CELL_BEFORE)?;
         let Colliders { floor, field, shells } = colliders;
-        let mut field = field.as_ref().map(|field| Seen::new(field, self.diameter));
+        let mut field = field.as_ref().map(|field| CachedField::new(field, self.diameter));
         // Distance (diameters) at 1 m/s.
         let ahead = (f64::from(SUB_STEPS_AHEAD) * dt / self.diameter) as f32;
-        let mut layout = self.lay_out(ahead);
+        let mut layout = self.sort_into_blocks(ahead);
         // Largest travel of the meshes in the step so far (diameters).
         let mut before = 0.0;
         let mut fastest = self.fastest();
@@ -173,15 +172,15 @@ impl Heap {
         ctx.expect(division.sub_steps);
         for sub in 0..division.sub_steps {
             ctx.check()?;
-            layout.follow(&mut self.rows, &self.ids, ahead);
-            follow(shells, (sub + 1) as f64 / division.sub_steps as f64, &mut pose)?;
+            layout.update_members(&mut self.rows, &self.ids, ahead);
+            advance_shells(shells, (sub + 1) as f64 / division.sub_steps as f64, &mut pose)?;
             let meshes: Vec<&Shell> = shells.iter().map(|(shell, _)| shell).collect();
             let travel = Travel::of(&meshes, self.diameter);
             let search = Search { shells: meshes, diameter: self.diameter, dt, before, travel };
-            self.touch(&mut layout, *floor, field.as_mut(), &search)?;
-            before += travel.most();
+            self.find_touches(&mut layout, *floor, field.as_mut(), &search)?;
+            before += travel.max();
             ctx.check()?;
-            layout.reach(coefficients.visits_all);
+            layout.mark_reached(coefficients.visits_all);
             layout.find_pairs();
             if sub == 0 && coefficients.air_by_neighbours.is_some() {
                 layout.count_neighbours(&self.rows);
@@ -191,20 +190,20 @@ impl Heap {
             fastest = sub_step(ctx, &mut self.rows, &mut layout, &coefficients, motion)?;
             ctx.advance();
         }
-        follow(shells, 1.0, &mut pose)?;
-        let end = trapped::End { layout: &layout, diameter: self.diameter, dt, travelled: before };
+        advance_shells(shells, 1.0, &mut pose)?;
+        let end = trapped::StepEnd { layout: &layout, diameter: self.diameter, dt, travelled: before };
         let deep = end.deep(&self.rows, &self.ids, &self.trapped, field.as_ref());
         self.trapped = end.release(&mut self.rows, &self.ids, &deep, colliders)?;
-        self.take_back(layout)?;
-        self.make_room(ctx, colliders, MOST)
+        self.store_layout(layout)?;
+        self.make_room(ctx, colliders, MAX_IN_CELL)
     }
 
     /// Sorts the grains into blocks.
-    fn lay_out(&mut self, ahead: f32) -> Layout {
+    fn sort_into_blocks(&mut self, ahead: f32) -> Layout {
         let from = order(&self.rows, &self.ids, &self.at);
-        self.keep(&from);
+        self.reorder(&from);
         let mut layout = Layout::new(&mut self.rows, &self.ids, &self.at, ahead);
-        layout.keep_held(std::mem::take(&mut self.held));
+        layout.keep_impulses(std::mem::take(&mut self.pair_impulses));
         for touch in std::mem::take(&mut self.touches) {
             layout.blocks[layout.homes[touch.grain as usize].block as usize].touches.push(touch);
         }
@@ -212,10 +211,10 @@ impl Heap {
     }
 
     /// Stores the data of a layout that the next step needs; removes the grains that have left its range.
-    fn take_back(&mut self, mut layout: Layout) -> Result<()> {
-        self.held = layout.take_held();
+    fn store_layout(&mut self, mut layout: Layout) -> Result<()> {
+        self.pair_impulses = layout.take_impulses();
         self.touches = layout.blocks.iter().flat_map(|block| block.touches.iter().copied()).collect();
-        self.touches.iter_mut().for_each(|touch| *touch = touch.kept());
+        self.touches.iter_mut().for_each(|touch| *touch = touch.for_next_step());
         self.touches.par_sort_unstable_by_key(Touch::key);
         self.rows.par_iter_mut().zip(&mut self.at).zip(&layout.homes).for_each(|((row, at), home)| {
             if home.block != NONE {
@@ -229,39 +228,39 @@ impl Heap {
             "a grain would move infinitely fast: the base layer or an object is not as it should be",
         )?;
         let is_there =
-            |slot: &u32| layout.homes[*slot as usize].block != NONE && holds(self.at[*slot as usize]);
+            |slot: &u32| layout.homes[*slot as usize].block != NONE && is_in_range(self.at[*slot as usize]);
         let kept: Vec<u32> = (0..self.rows.len() as u32).filter(is_there).collect();
         if kept.len() < self.rows.len() {
-            self.keep(&kept);
+            self.reorder(&kept);
         }
         Ok(())
     }
 
-    /// Reorders the grains by their old slots; those not in `from` are removed.
-    fn keep(&mut self, from: &[u32]) {
+    /// Moves the grains to new slots; `from` lists their old slots, and grains that it omits are removed.
+    fn reorder(&mut self, from: &[u32]) {
         let leaves_out = from.len() < self.rows.len();
         let mut slots = vec![NONE; self.rows.len()];
         from.iter().zip(0..).for_each(|(&was, slot)| slots[was as usize] = slot);
         self.rows = from.par_iter().map(|&from| self.rows[from as usize]).collect();
         self.ids = from.par_iter().map(|&from| self.ids[from as usize]).collect();
         self.at = from.par_iter().map(|&from| self.at[from as usize]).collect();
-        self.held
+        self.pair_impulses
             .par_iter_mut()
             .for_each(|held| held.grains = held.grains.map(|grain| slots[grain as usize]));
         self.touches.iter_mut().for_each(|touch| touch.grain = slots[touch.grain as usize]);
         if leaves_out {
-            self.held.retain(|held| !held.grains.contains(&NONE));
+            self.pair_impulses.retain(|held| !held.grains.contains(&NONE));
             self.touches.retain(|touch| touch.grain != NONE);
         }
         self.touches.par_sort_unstable_by_key(Touch::key);
     }
 
     /// Finds the touches of grains, and wakes the grains that a moving surface touches.
-    fn touch(
+    fn find_touches(
         &mut self,
         layout: &mut Layout,
         floor: Option<Floor>,
-        field: Option<&mut Seen<'_>>,
+        field: Option<&mut CachedField<'_>>,
         search: &Search<'_>,
     ) -> Result<()> {
         let mut fresh: Vec<Vec<Touch>> = vec![Vec::new(); layout.blocks.len()];
@@ -269,16 +268,16 @@ impl Heap {
             let rows = Shared::new(&mut self.rows);
             // Few blocks search, and those are adjacent: small tasks balance the load.
             let blocks = layout.blocks.par_iter_mut().zip(&mut fresh);
-            let asking: Vec<_> = blocks.filter(|(block, _)| search.may_be_near(block)).collect();
-            let asking = asking.into_par_iter().with_max_len(4);
-            asking.for_each_init(Scratch::default, |scratch, (block, fresh)| {
+            let searching: Vec<_> = blocks.filter(|(block, _)| search.may_be_near(block)).collect();
+            let searching = searching.into_par_iter().with_max_len(4);
+            searching.for_each_init(Scratch::default, |scratch, (block, fresh)| {
                 *fresh = search.touches(scratch, block, rows);
                 block.is_awake |= !fresh.is_empty();
             });
         }
         // Blocks at rest need no touches, but are due if their grains changed: grains that left take their touches along.
         layout.blocks.par_iter_mut().for_each(|block| {
-            block.is_due = block.lacks_touches && (block.is_awake || block.is_stirred);
+            block.is_due = block.lacks_touches && (block.is_awake || block.has_ever_changed);
             block.lacks_touches &= !block.is_due;
         });
         let due: Vec<u32> =
@@ -301,28 +300,28 @@ impl Heap {
     /// Overlaps (diameters) of touching pairs, for tests and reports.
     pub fn overlaps(&self) -> Vec<f32> {
         let mut heap = self.clone();
-        let mut layout = heap.lay_out(0.0);
-        layout.reach(true);
+        let mut layout = heap.sort_into_blocks(0.0);
+        layout.mark_reached(true);
         layout.find_pairs();
         layout.overlaps(&heap.rows)
     }
 }
 
 /// Advances meshes to the pose at a share 0..=1 of the step.
-fn follow(shells: &mut [(Shell, Pose<'_>)], share: f64, pose: &mut Vec<DVec3>) -> Result<()> {
+fn advance_shells(shells: &mut [(Shell, Pose<'_>)], share: f64, pose: &mut Vec<DVec3>) -> Result<()> {
     for (shell, at) in shells {
         at(share, pose)?;
-        shell.follow(pose);
+        shell.advance(pose);
     }
     Ok(())
 }
 
 /// Maximum number of grains in a cell that is not crowded; a random packing fits ten.
-pub const MOST: usize = 14;
+pub const MAX_IN_CELL: usize = 14;
 
-/// The same before a step: only a cell with more than this, for example from a file with many grains at one position, would give grains too
-/// many neighbours. Grains that the last step could not move out are not tried again.
-pub const MOST_BEFORE: usize = 64;
+/// The same before a step, much larger: only a cell with more, for example from a file with many grains at one position, would give grains
+/// too many neighbours. So grains that the last step could not move out are not tried again.
+pub const MAX_IN_CELL_BEFORE: usize = 64;
 
 /// The grains at the beginning of the last step.
 #[derive(Clone, Default)]

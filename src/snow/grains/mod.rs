@@ -44,14 +44,14 @@ use birth::sourcing::Sourcing;
 use heap::{Heap, Starts};
 use params::Division;
 use solver::layout::locate;
-use surroundings::{Bounds, Obstacles, TIES, have_stayed};
+use surroundings::{Bounds, Obstacles, WAKE_SETTINGS, have_stayed};
 
 pub use crate::snow::grains::heap::Start;
 pub use birth::removed_snow::{Base, Removal, removals};
 pub use birth::sourcing::PACKING;
 pub use colliders::ground::Ground;
 pub use params::Params;
-pub(super) use surroundings::HOLES;
+pub(super) use surroundings::MAX_CLOSED_HOLES;
 pub use surroundings::{FASTEST_OBJECT, Object, Surroundings};
 
 /// Where and when a grain was created.
@@ -73,8 +73,8 @@ pub struct Grains {
     next_id: u32,
     /// Grains that the removed snow of a block of the base has paid for but that do not exist yet: mostly fractions.
     owed: BTreeMap<Origin, f64>,
-    /// Settings of the last step whose change wakes all grains: see [`Surroundings::ties`].
-    ties: [f64; TIES],
+    /// Settings of the last step whose change wakes all grains: see [`Surroundings::wake_settings`].
+    wake_settings: [f64; WAKE_SETTINGS],
     /// Bounding boxes (m) of the meshes at the end of the last step.
     boxes: Vec<Bounds>,
     starts: Starts,
@@ -114,7 +114,7 @@ pub struct StepReport {
 const VOXEL: f32 = 2.0;
 
 /// Largest component (m/s) of the velocity of an emitted grain.
-pub const FASTEST: f32 = 10_000.0;
+pub const MAX_SPEED: f32 = 10_000.0;
 
 /// Memory (bytes) of grains in a step, including the copy that a failed step restores.
 pub fn memory(grains: usize) -> u64 {
@@ -130,7 +130,16 @@ impl Grains {
         params.validate()?;
         let heap = Heap::new(2.0 * params.radius);
         let (births, owed, boxes, starts) = Default::default();
-        Ok(Self { params, heap, births, next_id: 0, owed, ties: [0.0; TIES], boxes, starts })
+        Ok(Self {
+            params,
+            heap,
+            births,
+            next_id: 0,
+            owed,
+            wake_settings: [0.0; WAKE_SETTINGS],
+            boxes,
+            starts,
+        })
     }
 
     /// Resumes from a state that [`Grains::save`] wrote.
@@ -181,7 +190,7 @@ impl Grains {
     /// birth. Returns the identity of the first; the others follow in order. On error nothing changes.
     ///
     /// # Errors
-    /// Too many grains; a position out of range; a velocity that is not finite or over [`FASTEST`].
+    /// Too many grains; a position out of range; a velocity that is not finite or over [`MAX_SPEED`].
     pub fn emit(&mut self, positions: &[DVec3], velocities: &[[f32; 3]], frame: i32) -> Result<u32> {
         if !velocities.is_empty() && velocities.len() != positions.len() {
             let (given, count) = (velocities.len(), positions.len());
@@ -191,18 +200,18 @@ impl Grains {
         }
         let is_out = |position: &DVec3| {
             !position.iter().all(|x| x.is_finite())
-                || !solver::layout::holds(locate(*position, self.heap.diameter).0)
+                || !solver::layout::is_in_range(locate(*position, self.heap.diameter).0)
         };
         if let Some(at) = positions.iter().position(is_out) {
             return Err(Error::argument(format!("positions: element {at} is too far from the origin")));
         }
-        let is_fast = |velocity: &[f32; 3]| velocity.iter().any(|x| !(-FASTEST..=FASTEST).contains(x));
+        let is_fast = |velocity: &[f32; 3]| velocity.iter().any(|x| !(-MAX_SPEED..=MAX_SPEED).contains(x));
         if let Some(at) = velocities.iter().position(is_fast) {
             return Err(Error::argument(format!(
-                "velocities: element {at} has a component that is not within -{FASTEST} to {FASTEST} m/s"
+                "velocities: element {at} has a component that is not within -{MAX_SPEED} to {MAX_SPEED} m/s"
             )));
         }
-        self.room_for(positions.len(), frame)?;
+        self.check_count(positions.len(), frame)?;
         let first = self.next_id;
         for (at, position) in positions.iter().enumerate() {
             self.add(*position, velocities.get(at).copied().unwrap_or_default(), frame)?;
@@ -211,12 +220,12 @@ impl Grains {
     }
 
     /// Fails if there would be more grains than allowed.
-    fn room_for(&self, more: usize, frame: i32) -> Result<()> {
-        let (count, most) = (self.heap.count() + more, self.params.most);
+    fn check_count(&self, more: usize, frame: i32) -> Result<()> {
+        let (count, max_grains) = (self.heap.count() + more, self.params.max_grains);
         ensure(
-            count <= most && self.next_id as usize + more <= solver::contacts::MOST,
+            count <= max_grains && self.next_id as usize + more <= solver::contacts::MAX_GRAINS,
             format_args!(
-                "frame {frame} would have {count} grains, more than max = {most}: larger grains or more compression make fewer"
+                "frame {frame} would have {count} grains, more than max = {max_grains}: larger grains or more compression make fewer"
             ),
         )?;
         Ok(())
@@ -251,14 +260,14 @@ impl Grains {
         self.starts = Starts::of(&self.heap, self.next_id);
         let stepped = ctx.step(["source", "colliders", "move"].len(), || {
             let (born, removed_volume) = ctx.phase("source", || {
-                let ties = around.ties(&self.params);
-                if std::mem::replace(&mut self.ties, ties) != ties {
+                let wake_settings = around.wake_settings(&self.params);
+                if std::mem::replace(&mut self.wake_settings, wake_settings) != wake_settings {
                     self.heap.wake(|_| true);
                 }
                 self.source(ctx, around, [from, to], frame)
             })?;
             let mut obstacles = ctx.phase("colliders", || self.obstacles(around, [from, to]))?;
-            let sub_steps = self.params.sub_steps(to - from, obstacles.way);
+            let sub_steps = self.params.sub_steps(to - from, obstacles.max_displacement);
             let division = Division { dt: to - from, sub_steps };
             let all = self.heap.count();
             let ([expired, fell], resting, fastest) = ctx.phase("move", || {
@@ -313,7 +322,7 @@ impl Grains {
         frame: i32,
     ) -> Result<(usize, f64)> {
         let Some(after) = around.base.after() else { return Ok((0, 0.0)) };
-        let Some((before, removals)) = around.base.taken(ctx)? else { return Ok((0, 0.0)) };
+        let Some((before, removals)) = around.base.removed(ctx)? else { return Ok((0, 0.0)) };
         self.wake_near(&removals, after.voxel_size());
         let claims = Claims::new(around.objects, self.params.compression, [from, to])?;
         let sourcing = Sourcing { diameter: self.heap.diameter, claims, seed: self.params.seed, frame };
@@ -321,7 +330,7 @@ impl Grains {
         let cell = after.voxel_size();
         let behind = |position: DVec3| around.is_behind(position, 2.0 * cell);
         let positions = sourcing.positions([before.grid(), after], &removals, &mut self.owed, behind)?;
-        self.room_for(positions.len(), frame)?;
+        self.check_count(positions.len(), frame)?;
         ctx.allow("the grains", memory(self.heap.count() + positions.len()))?;
         for position in &positions {
             self.add(*position, [0.0; 3], frame)?;

@@ -40,7 +40,7 @@ pub struct Params {
     /// Minimum and maximum corner (m) of a box; grains outside are removed; none: no box.
     pub keep_box: Option<[DVec3; 2]>,
     /// Maximum number of grains; more are an error.
-    pub most: usize,
+    pub max_grains: usize,
     /// Seed of the positions of new grains.
     pub seed: u64,
 }
@@ -48,9 +48,9 @@ pub struct Params {
 /// Maximum g dt^2 / d of a sub-step: a grain at rest falls by this fraction of its diameter.
 const FALL: f64 = 0.02;
 /// Maximum displacement of an object in a sub-step (diameters).
-const WAY: f64 = 2.0;
-/// Fast objects multiply the count of sub-steps by at most this.
-const MOST_OF_FALL: usize = 8;
+const MAX_OBJECT_STEP: f64 = 2.0;
+/// Maximum factor by which fast objects raise the count of sub-steps.
+const MAX_FACTOR: usize = 8;
 
 impl Params {
     /// The look of the thesis for a layer with cells of `cell` m: the radius is a third of a cell.
@@ -69,7 +69,7 @@ impl Params {
             sub_steps: None,
             lifetime: None,
             keep_box: None,
-            most: 20_000_000,
+            max_grains: 20_000_000,
             seed: 0,
         }
     }
@@ -109,17 +109,17 @@ impl Params {
         Ok(())
     }
 
-    /// Count of sub-steps in a step of `dt` (s) in which objects move by at most `way` (m). A grain falls by at most 0.02 of
+    /// Count of sub-steps in a step of `dt` (s) in which objects move by at most `displacement` (m). A grain falls by at most 0.02 of
     /// its diameter in a sub-step, which keeps deep heaps dense; an object moves by at most two diameters, unless that needs
     /// more than eight times as many sub-steps.
-    pub fn sub_steps(&self, dt: f64, way: f64) -> usize {
+    pub fn sub_steps(&self, dt: f64, displacement: f64) -> usize {
         if let Some(count) = self.sub_steps {
             return count as usize;
         }
         let diameter = 2.0 * self.radius;
-        let of_fall = (dt * (self.gravity.abs() / (FALL * diameter)).sqrt()).ceil().max(1.0) as usize;
-        let of_way = (way / (WAY * diameter)).ceil() as usize;
-        of_way.clamp(of_fall, of_fall.saturating_mul(MOST_OF_FALL))
+        let for_fall = (dt * (self.gravity.abs() / (FALL * diameter)).sqrt()).ceil().max(1.0) as usize;
+        let for_objects = (displacement / (MAX_OBJECT_STEP * diameter)).ceil() as usize;
+        for_objects.clamp(for_fall, for_fall.saturating_mul(MAX_FACTOR))
     }
 
     /// Friction against the base layer. The base is snow too: grains stay on it up to their own angle of repose.
@@ -132,7 +132,7 @@ impl Params {
     pub fn coefficients(&self, division: &Division) -> Coefficients {
         let dt = division.dt / division.sub_steps as f64;
         let up = if self.gravity == 0.0 { 0.0 } else { -self.gravity.signum() as f32 };
-        let friction_of_sliding = if self.attraction > 0.0 { 1.0 } else { SLIDING } * self.friction;
+        let friction_of_sliding = if self.attraction > 0.0 { 1.0 } else { SLIDING_SHARE } * self.friction;
         Coefficients {
             dt: dt as f32,
             diameter: (2.0 * self.radius) as f32,
@@ -147,7 +147,7 @@ impl Params {
             weight: (self.gravity.abs() * dt) as f32,
             restitution: self.restitution as f32,
             bouncing: (BOUNCING * self.gravity.abs() * dt) as f32,
-            band: BAND,
+            band: ATTRACTION_GAP,
             rest: self.rests.then(|| Rest::new(2.0 * self.radius, self.gravity, dt)),
             visits_all: false,
         }
@@ -155,14 +155,14 @@ impl Params {
 }
 
 /// Friction between loose grains that slide over each other, as a share of that between grains that do not yet.
-const SLIDING: f64 = 0.8;
+const SLIDING_SHARE: f64 = 0.8;
 /// Square of the speed above which a grain slides, in diameters times gravity: the speed is a tenth of that at which it could rise by half
 /// a diameter.
 const SLIDES: f64 = 0.01;
 /// Minimum speed of a bounce, in sub-steps of gravity.
 const BOUNCING: f64 = 4.0;
 /// Maximum gap (diameters) at which grains attract each other.
-const BAND: f32 = 0.05;
+const ATTRACTION_GAP: f32 = 0.05;
 
 /// How a step is divided.
 #[derive(Debug, Clone, Copy)]

@@ -6,9 +6,9 @@ use super::Grains;
 use super::colliders::touch::Touch;
 use super::heap::Heap;
 use super::solver::blocks::EDGE;
-use super::solver::contacts::MOST;
-use super::solver::layout::holds;
-use super::solver::pairs::Held;
+use super::solver::contacts::MAX_GRAINS;
+use super::solver::layout::is_in_range;
+use super::solver::pairs::PairImpulse;
 use super::solver::rows::Row;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
@@ -25,7 +25,7 @@ pub fn save(grains: &Grains) -> Vec<u8> {
     let heap = &grains.heap;
     let mut to = Writer::default();
     to.f64(heap.diameter);
-    grains.ties.iter().for_each(|number| to.f64(*number));
+    grains.wake_settings.iter().for_each(|number| to.f64(*number));
     to.count(grains.boxes.len());
     grains.boxes.iter().flatten().flat_map(|corner| corner.iter()).for_each(|number| to.f64(*number));
     to.u32(grains.next_id);
@@ -35,14 +35,14 @@ pub fn save(grains: &Grains) -> Vec<u8> {
         to.i32s(at);
         to.f32s(&row.position);
         to.f32s(&row.velocity);
-        to.f32s(&row.since);
-        to.f32s(&[row.hold, row.still]);
+        to.f32s(&row.reference);
+        to.f32s(&[row.mass_state, row.still]);
         let birth = &grains.births[*id as usize];
         to.f32s(&birth.rest);
         to.i32s(&[birth.frame]);
     }
-    to.count(heap.held.len());
-    for held in &heap.held {
+    to.count(heap.pair_impulses.len());
+    for held in &heap.pair_impulses {
         held.grains.iter().for_each(|grain| to.u32(*grain));
         to.f32s(&held.impulse);
     }
@@ -51,7 +51,7 @@ pub fn save(grains: &Grains) -> Vec<u8> {
         to.u32(touch.grain);
         to.u32(touch.collider);
         to.f32s(&[touch.impulse]);
-        to.f32s(&touch.across);
+        to.f32s(&touch.tangential);
     }
     to.count(heap.trapped.len());
     heap.trapped.iter().for_each(|id| to.u32(*id));
@@ -75,7 +75,7 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
         return Err(wrong(format!("has grains of {diameter} m, not {}", grains.heap.diameter)));
     }
     let mut heap = Heap::new(diameter);
-    for tie in &mut grains.ties {
+    for tie in &mut grains.wake_settings {
         *tie = from.f64()?;
     }
     for _ in 0..from.count(48)? {
@@ -84,19 +84,25 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
     }
     grains.next_id = from.u32()?;
     let count = from.count(ROW)?;
-    require(count <= MOST && grains.next_id as usize <= MOST, "has more grains than there may be")?;
+    require(
+        count <= MAX_GRAINS && grains.next_id as usize <= MAX_GRAINS,
+        "has more grains than there may be",
+    )?;
     grains.births = vec![Default::default(); grains.next_id as usize];
     for _ in 0..count {
         let id = from.u32()?;
         heap.ids.push(id);
         heap.at.push(from.i32s()?);
-        require(heap.at.last().is_some_and(|at| holds(*at)), "has a grain that is too far from the origin")?;
-        let (position, velocity, since) = (from.f32s()?, from.f32s()?, from.f32s()?);
-        let [hold, still] = from.f32s()?;
-        if ![0.0, 1.0, 2.0, 3.0].contains(&hold) || position.iter().any(|x| !(0.0..=EDGE).contains(x)) {
+        require(
+            heap.at.last().is_some_and(|at| is_in_range(*at)),
+            "has a grain that is too far from the origin",
+        )?;
+        let (position, velocity, reference) = (from.f32s()?, from.f32s()?, from.f32s()?);
+        let [mass_state, still] = from.f32s()?;
+        if ![0.0, 1.0, 2.0, 3.0].contains(&mass_state) || position.iter().any(|x| !(0.0..=EDGE).contains(x)) {
             return Err(wrong("has a grain that lies in no block"));
         }
-        heap.rows.push(Row { position, hold, velocity, still, since, ..Row::default() });
+        heap.rows.push(Row { position, mass_state, velocity, still, reference, ..Row::default() });
         let birth = grains.births.get_mut(id as usize).ok_or_else(|| wrong("has a grain without birth"))?;
         (birth.rest, [birth.frame]) = (from.f32s()?, from.i32s()?);
     }
@@ -105,13 +111,13 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
         if grains.iter().any(|grain| *grain as usize >= count) || grains[0] == grains[1] {
             return Err(wrong("has a contact of a grain that is not there"));
         }
-        heap.held.push(Held { grains, impulse: from.f32s()? });
+        heap.pair_impulses.push(PairImpulse { grains, impulse: from.f32s()? });
     }
     for _ in 0..from.count(24)? {
         let (grain, collider) = (from.u32()?, from.u32()?);
         require((grain as usize) < count, "has a contact of a grain that is not there")?;
-        let ([impulse], across) = (from.f32s()?, from.f32s()?);
-        heap.touches.push(Touch { grain, collider, impulse, across, ..Touch::default() });
+        let ([impulse], tangential) = (from.f32s()?, from.f32s()?);
+        heap.touches.push(Touch { grain, collider, impulse, tangential, ..Touch::default() });
     }
     for _ in 0..from.count(4)? {
         heap.trapped.push(from.u32()?);

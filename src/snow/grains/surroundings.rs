@@ -16,7 +16,7 @@ pub struct Surroundings<'a> {
     pub base: Base<'a>,
     /// Moving objects.
     pub objects: &'a [Object<'a>],
-    /// Static meshes that have two sides: triangles and positions (m).
+    /// Static meshes that collide on both sides: triangles and positions (m).
     pub statics: &'a [&'a TriMesh],
     /// Ground and static solids, in front of which grains stay.
     pub ground: &'a [Ground],
@@ -58,7 +58,7 @@ pub struct Obstacles<'a> {
     /// For the heap.
     pub colliders: Colliders<'a>,
     /// Largest displacement of a vertex near the grains in the step (m).
-    pub way: f64,
+    pub max_displacement: f64,
     /// Bounding boxes of all meshes at the start and end of the step.
     pub boxes: [Vec<Bounds>; 2],
 }
@@ -66,17 +66,17 @@ pub struct Obstacles<'a> {
 /// Largest jump (diameters) of a mesh's box between two steps; a larger one wakes all grains.
 const JUMP: f64 = 0.1;
 /// Holes of less than this share of an object's area are closed; an object with larger holes, such as a bowl, collides on both sides.
-pub const HOLES: f64 = 0.1;
+pub const MAX_CLOSED_HOLES: f64 = 0.1;
 /// Speed (m/s) above which an object does not move through a step but is at its final position throughout: it jumps from one shot, or from
 /// one side of a set, to the next.
 pub const FASTEST_OBJECT: f64 = 100.0;
-/// Number of values in [`Surroundings::ties`].
-pub const TIES: usize = 6;
+/// Number of values in [`Surroundings::wake_settings`].
+pub const WAKE_SETTINGS: usize = 6;
 
 impl<'a> Surroundings<'a> {
     /// Settings whose change wakes all grains: gravity, friction, attraction, whether grains rest, whether there is a base,
     /// and the floor's height.
-    pub fn ties(&self, params: &Params) -> [f64; TIES] {
+    pub fn wake_settings(&self, params: &Params) -> [f64; WAKE_SETTINGS] {
         let Params { gravity, friction, attraction, rests, .. } = *params;
         let has_base = self.base.after().is_some();
         let floor = self.floor.unwrap_or(f64::MIN);
@@ -97,14 +97,14 @@ impl<'a> Surroundings<'a> {
         let floor = self.floor.map(|height| Floor { height, friction: FRICTION });
         let field = |grid| Field { grid, friction: params.friction_of_base() as f32 };
         let mut colliders = Colliders { floor, field: self.base.after().map(field), shells: Vec::new() };
-        let mut way = 0.0f64;
+        let mut max_displacement = 0.0f64;
         let mut boxes = [Vec::new(), Vec::new()];
         for (index, object) in self.objects.iter().enumerate().filter(|(_, object)| object.pushes) {
             let body = object.body;
             let (mut first, mut last) = (Vec::new(), Vec::new());
             body.closed_pose(from, &mut first)?;
             body.closed_pose(to, &mut last)?;
-            let closed = body.share_of_caps(&first) < HOLES && body.contradictions() == 0;
+            let closed = body.share_of_caps(&first) < MAX_CLOSED_HOLES && body.contradictions() == 0;
             let own = if closed { first.len() } else { body.motion().vertex_count() };
             first.truncate(own);
             last.truncate(own);
@@ -120,7 +120,11 @@ impl<'a> Surroundings<'a> {
                 );
                 first.clone_from(&last);
             }
-            way = first.iter().zip(&last).map(|(a, b)| way_near(*a, *b, grains)).fold(way, f64::max);
+            max_displacement = first
+                .iter()
+                .zip(&last)
+                .map(|(a, b)| displacement_near(*a, *b, grains))
+                .fold(max_displacement, f64::max);
             let triangles = match closed {
                 true => body.closed_triangles().collect(),
                 false => body.triangles().to_vec(),
@@ -152,7 +156,7 @@ impl<'a> Surroundings<'a> {
             let stands = |_: f64, _: &mut Vec<DVec3>| Ok(());
             colliders.shells.push((shell, Box::new(stands)));
         }
-        Ok(Obstacles { colliders, way, boxes })
+        Ok(Obstacles { colliders, max_displacement, boxes })
     }
 }
 
@@ -162,14 +166,14 @@ fn speed(first: &[DVec3], last: &[DVec3], dt: f64) -> f64 {
 }
 
 /// Displacement of a vertex if it may come near a box, else 0; its path may deviate sideways by as much as the displacement.
-fn way_near(from: DVec3, to: DVec3, [low, high]: &Bounds) -> f64 {
-    let way = (to - from).norm();
-    let room = DVec3::repeat(way);
+fn displacement_near(from: DVec3, to: DVec3, [low, high]: &Bounds) -> f64 {
+    let displacement = (to - from).norm();
+    let margin = DVec3::repeat(displacement);
     let is_off = |axis: usize| {
-        from[axis].max(to[axis]) + room[axis] < low[axis]
-            || from[axis].min(to[axis]) - room[axis] > high[axis]
+        from[axis].max(to[axis]) + margin[axis] < low[axis]
+            || from[axis].min(to[axis]) - margin[axis] > high[axis]
     };
-    if (0..3).any(is_off) { 0.0 } else { way }
+    if (0..3).any(is_off) { 0.0 } else { displacement }
 }
 
 /// Whether the boxes agree to within a small part of a diameter (m).

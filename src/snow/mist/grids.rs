@@ -66,7 +66,7 @@ fn piece(mist: &Mist, slot: usize, tile: &Tile) -> Option<Piece> {
     let velocity = mist.flow.velocity();
     for (cell, value) in values.iter_mut().enumerate() {
         *value = std::array::from_fn(|axis| {
-            let (above, upper) = mist.flow.tiles().beside(slot, cell, axis, true);
+            let (above, upper) = mist.flow.tiles().adjacent_cell(slot, cell, axis, true);
             0.5 * (velocity[axis][slot][cell] + velocity[axis][above as usize][upper])
         });
     }

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
-use crate::flow::{Coord, FARTHEST, Flow, FlowState, Keeping, Solids, Tiles, tiles};
+use crate::flow::{Coord, FARTHEST, Flow, FlowState, MassConservation, Solids, Tiles, tiles};
 use crate::numeric::checks::ensure;
 use sources::Seed;
 
@@ -30,22 +30,22 @@ pub use surroundings::{Surroundings, Walls};
 
 /// Fraction of the faces at which air may be too fast for a sub-step; such air is pressed through gaps as narrow as a cell, and its path is
 /// clamped to [`FARTHEST`] cells. Otherwise a dozen such cells among two million would nearly double the sub-steps of a sleigh's mist.
-const JETS: f64 = 1.0e-4;
+const JET_SHARE: f64 = 1.0e-4;
 /// Density below which there is no mist.
-pub const LEAST: f32 = 2.0e-3;
+pub const MIN_DENSITY: f32 = 2.0e-3;
 /// Density from which a tile is padded with air, so that its mist may spread there. Thinner mist is invisible and only moves on in existing
 /// tiles: otherwise a few fast grains would open hundreds of tiles for a litre of mist.
 const DENSE: f32 = 0.02;
-/// Maximum length (s) of a sub-step. It affects how far mist spreads, and how often grains fill the cells that they cross: frames of 1/24,
-/// 1/48 and 1/96 s have the same sub-steps.
-const LONGEST: f64 = 1.0 / 96.0;
+/// Maximum length (s) of a sub-step. The length affects how far mist spreads, and how often grains fill the cells that they cross: it is
+/// chosen so that frames of 1/24, 1/48 and 1/96 s have the same sub-steps.
+const MAX_SUB_STEP: f64 = 1.0 / 96.0;
 /// Maximum number of sub-steps of a step, and of parts of a sub-step.
-const MOST: usize = 1000;
+const MAX_SUB_STEPS: usize = 1000;
 
 /// Results of a step.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StepReport {
-    /// Number of active cells after it.
+    /// Number of active cells after the step.
     pub cells: usize,
     /// Sum of the density, times the volume of a cell (m3).
     pub mass: f64,
@@ -53,7 +53,7 @@ pub struct StepReport {
     pub sources: usize,
     /// Number of sub-steps.
     pub sub_steps: usize,
-    /// Total iterations of its projections.
+    /// Iterations of all pressure projections.
     pub iterations: usize,
     /// Largest divergence, times the cell, that a projection left, relative to the largest speed before.
     pub divergence: f32,
@@ -74,11 +74,11 @@ pub fn memory(tiles: usize) -> u64 {
 /// Open fractions and speeds of faces, for tiles and the edge (m) of their cells, at a share 0..=1 of a step.
 pub type Boundary<'a> = dyn Fn(&Tiles, f32, f64) -> Result<Solids> + Sync + 'a;
 
-/// The surroundings that act on mist in a step.
-pub struct Around<'a> {
+/// Inputs of a step of mist besides the mist itself.
+pub struct StepInputs<'a> {
     /// Grains; the fast ones raise mist.
     pub sources: &'a [Source],
-    /// Obstacles that it flows around.
+    /// Obstacles that the air flows around.
     pub boundary: &'a Boundary<'a>,
     /// Largest speed (m/s) of these obstacles.
     pub fastest: f64,
@@ -161,11 +161,11 @@ impl Mist {
         &self.flow
     }
 
-    /// Adds mist: `of` returns the density and velocity (m/s) at a cell; a density of 0 adds none.
+    /// Adds mist to tiles: `of` returns the density and velocity (m/s) of a cell; a density of 0 adds none.
     pub fn add(&mut self, tiles: &[Coord], of: impl Fn([i32; 3]) -> (f32, [f32; 3])) {
         let seeds = sources::new_mist::seeds(tiles, of);
-        self.flow.resize(&self.wanted(&seeds));
-        self.sow(&seeds);
+        self.flow.resize(&self.needed_tiles(&seeds));
+        self.add_seeds(&seeds);
     }
 
     /// Moves the mist from `from` to `to` (s), while grains raise more. A step that fails or is cancelled leaves it unchanged.
@@ -173,7 +173,7 @@ impl Mist {
     /// # Errors
     /// Times that do not ascend; a grain that is not finite or is too large; air that moves too fast for its cells; more memory than the
     /// context allows; cancel; errors of the boundary.
-    pub fn step(&mut self, ctx: &Context, around: &Around<'_>, times: [f64; 2]) -> Result<StepReport> {
+    pub fn step(&mut self, ctx: &Context, around: &StepInputs<'_>, times: [f64; 2]) -> Result<StepReport> {
         let [from, to] = times;
         ensure(
             to > from && (to - from).is_finite(),
@@ -182,19 +182,24 @@ impl Mist {
         around.sources.iter().try_for_each(|source| source.check(self.params.cell))?;
         let raising = around.sources.iter().filter(|source| source.raises(&self.params));
         let raising: Vec<Source> = raising.copied().collect();
-        ctx.pool().install(|| self.before.become_of(&self.flow));
-        let around = Around { sources: &raising, ..*around };
-        match ctx.step(1, || ctx.phase("flow", || self.carry(ctx, &around, times))) {
+        ctx.pool().install(|| self.before.copy_from(&self.flow));
+        let around = StepInputs { sources: &raising, ..*around };
+        match ctx.step(1, || ctx.phase("flow", || self.run_sub_steps(ctx, &around, times))) {
             Ok((report, phases)) => Ok(StepReport { sources: raising.len(), phases, ..report }),
             Err(error) => {
-                self.flow.put_back(&mut self.before);
+                self.flow.restore(&mut self.before);
                 Err(error)
             }
         }
     }
 
     /// Moves the mist in sub-steps; in each of them grains raise more along their paths.
-    fn carry(&mut self, ctx: &Context, around: &Around<'_>, [from, to]: [f64; 2]) -> Result<StepReport> {
+    fn run_sub_steps(
+        &mut self,
+        ctx: &Context,
+        around: &StepInputs<'_>,
+        [from, to]: [f64; 2],
+    ) -> Result<StepReport> {
         let sub_steps = self.sub_steps(around, to - from)?;
         let part = (to - from) / sub_steps as f64;
         let mut report = StepReport { sub_steps, ..StepReport::default() };
@@ -202,7 +207,7 @@ impl Mist {
         for sub in 0..sub_steps {
             ctx.check()?;
             let shares = [sub, sub + 1].map(|sub| sub as f64 / sub_steps as f64);
-            self.push(ctx, around.wind, from + part * sub as f64, part)?;
+            self.apply_forces(ctx, around.wind, from + part * sub as f64, part)?;
             let boundary = |tiles: &Tiles, cell: f32| (around.boundary)(tiles, cell, shares[1]);
             let solved = self.flow.project(ctx, &boundary, self.params.tolerance as f32)?;
             report.iterations += solved.iterations;
@@ -210,7 +215,7 @@ impl Mist {
                 report.divergence = report.divergence.max(solved.divergence / solved.fastest);
             }
             self.flow.clear_covered();
-            self.follow_air(ctx, part)?;
+            self.advect(ctx, part)?;
             // Last, so that new mist is where its grains were and begins to move in the next sub-step.
             self.raise(ctx, around.sources, to - from, shares)?;
             ctx.advance();
@@ -222,28 +227,28 @@ impl Mist {
     }
 
     /// Number of sub-steps such that neither the air nor a grain nor an object moves farther than [`FARTHEST`] cells in one.
-    fn sub_steps(&self, around: &Around<'_>, dt: f64) -> Result<usize> {
+    fn sub_steps(&self, around: &StepInputs<'_>, dt: f64) -> Result<usize> {
         let speeds = around.sources.iter().map(Source::fastest);
-        let fastest = speeds.fold(self.bulk(), |most, speed| most.max(speed));
+        let fastest = speeds.fold(self.bulk_speed(), |max, speed| max.max(speed));
         let speed = f64::from(fastest).max(around.fastest) + self.params.gravity.abs() * dt;
-        // Each of the longest sub-steps is divided into the same whole number of parts, so that frames of other lengths have the same
+        // Each sub-step of maximum length is divided into the same whole number of parts, so that frames of other lengths have the same
         // sub-steps.
-        let least = ((dt / LONGEST * (1.0 - 1.0e-9)).ceil() as usize).clamp(1, MOST);
-        Ok(self.parts(speed, dt)?.div_ceil(least) * least)
+        let min = ((dt / MAX_SUB_STEP * (1.0 - 1.0e-9)).ceil() as usize).clamp(1, MAX_SUB_STEPS);
+        Ok(self.parts(speed, dt)?.div_ceil(min) * min)
     }
 
     /// Speed (m/s) that the air does not exceed, except in jets.
-    fn bulk(&self) -> f32 {
-        self.flow.fastest_but(JETS).min(self.flow.fastest())
+    fn bulk_speed(&self) -> f32 {
+        self.flow.fastest_except(JET_SHARE).min(self.flow.fastest())
     }
 
     /// Number of parts into which a time (s) is divided for a speed (m/s).
     fn parts(&self, speed: f64, dt: f64) -> Result<usize> {
         let count = (speed * dt / (f64::from(FARTHEST) * self.params.cell)).ceil();
         ensure(
-            count <= MOST as f64,
+            count <= MAX_SUB_STEPS as f64,
             format_args!(
-                "mist moves at {speed:.0} m/s, more than {MOST} steps of {FARTHEST} cells of {} m in {dt:.4} s",
+                "mist moves at {speed:.0} m/s, more than {MAX_SUB_STEPS} steps of {FARTHEST} cells of {} m in {dt:.4} s",
                 self.params.cell
             ),
         )?;
@@ -252,19 +257,19 @@ impl Mist {
 
     /// Adds the mist that grains raise in a step of `dt` (s) along the part of their paths between two fractions (0..=1) of the step.
     fn raise(&mut self, ctx: &Context, sources: &[Source], dt: f64, shares: [f64; 2]) -> Result<()> {
-        let ways = sources::ways(sources, &self.params, dt, shares);
-        let seeds = sources::seeds(ctx, &ways, &self.params)?;
-        let wanted = self.wanted(&seeds);
-        let what = format!("mist of {} cells of {:.4} m", 512 * wanted.len(), self.params.cell);
-        ctx.allow(&what, memory(wanted.len()))?;
-        self.flow.resize(&wanted);
-        self.sow(&seeds);
+        let paths = sources::paths(sources, &self.params, dt, shares);
+        let seeds = sources::seeds(ctx, &paths, &self.params)?;
+        let needed_tiles = self.needed_tiles(&seeds);
+        let what = format!("mist of {} cells of {:.4} m", 512 * needed_tiles.len(), self.params.cell);
+        ctx.allow(&what, memory(needed_tiles.len()))?;
+        self.flow.resize(&needed_tiles);
+        self.add_seeds(&seeds);
         Ok(())
     }
 
     /// Applies the forces to the air for `dt` (s) from a time (s) on.
-    fn push(&mut self, ctx: &Context, wind: Option<&Wind<'_>>, time: f64, dt: f64) -> Result<()> {
-        forces::fall(&mut self.flow, (self.params.gravity * dt) as f32);
+    fn apply_forces(&mut self, ctx: &Context, wind: Option<&Wind<'_>>, time: f64, dt: f64) -> Result<()> {
+        forces::apply_gravity(&mut self.flow, (self.params.gravity * dt) as f32);
         if let Some(wind) = wind {
             wind.blow(ctx, &mut self.flow, dt)?;
         }
@@ -276,12 +281,15 @@ impl Mist {
     }
 
     /// Advects the air and the mist for `dt` (s); some of the mist dissipates.
-    fn follow_air(&mut self, ctx: &Context, dt: f64) -> Result<()> {
+    fn advect(&mut self, ctx: &Context, dt: f64) -> Result<()> {
         // The boundary may have made the air faster than it was when the sub-steps were chosen.
-        let parts = self.parts(f64::from(self.bulk()), dt)?;
+        let parts = self.parts(f64::from(self.bulk_speed()), dt)?;
         let part = dt / parts as f64;
-        let keeping = Keeping { share: libm::exp2(-part / self.params.half_life) as f32, least: LEAST };
-        (0..parts).try_for_each(|_| self.flow.advect_keeping(ctx, part, keeping))
+        let conservation = MassConservation {
+            kept_share: libm::exp2(-part / self.params.half_life) as f32,
+            fade_below: MIN_DENSITY,
+        };
+        (0..parts).try_for_each(|_| self.flow.advect_conserving(ctx, part, conservation))
     }
 
     /// Sum of the density, times the volume of a cell (m3).
@@ -292,20 +300,20 @@ impl Mist {
     }
 
     /// The tiles that hold mist or will receive some, and padding around those whose density is visible.
-    fn wanted(&self, seeds: &[Seed]) -> Vec<Coord> {
-        let most = |tile: &crate::flow::Tile| tile.iter().fold(0.0f32, |most, density| most.max(*density));
+    fn needed_tiles(&self, seeds: &[Seed]) -> Vec<Coord> {
+        let max = |tile: &crate::flow::Tile| tile.iter().fold(0.0f32, |max, density| max.max(*density));
         let held = self.flow.tiles().coords().iter().zip(self.flow.density());
-        let held = held.map(|(coord, tile)| (*coord, most(tile)));
-        let new = seeds.iter().map(|seed| (seed.coord, most(&seed.density)));
-        let all: Vec<(Coord, f32)> = held.chain(new).filter(|(_, most)| *most > LEAST).collect();
+        let held = held.map(|(coord, tile)| (*coord, max(tile)));
+        let new = seeds.iter().map(|seed| (seed.coord, max(&seed.density)));
+        let all: Vec<(Coord, f32)> = held.chain(new).filter(|(_, max)| *max > MIN_DENSITY).collect();
         let mut dense: Vec<Coord> =
-            all.iter().filter(|(_, most)| *most > DENSE).map(|(coord, _)| *coord).collect();
+            all.iter().filter(|(_, max)| *max > DENSE).map(|(coord, _)| *coord).collect();
         dense.sort_unstable();
         dense.dedup();
-        let mut wanted = tiles::bordered(&dense, self.params.padding as usize);
-        wanted.extend(all.iter().map(|(coord, _)| *coord));
-        wanted.sort_unstable();
-        wanted.dedup();
-        wanted
+        let mut needed_tiles = tiles::bordered(&dense, self.params.padding as usize);
+        needed_tiles.extend(all.iter().map(|(coord, _)| *coord));
+        needed_tiles.sort_unstable();
+        needed_tiles.dedup();
+        needed_tiles
     }
 }

@@ -4,7 +4,7 @@
 //! half their radius. A single grid would store the base's surface on the voxels of the grains.
 
 use super::fill;
-use super::spheres::{Spheres, Squares};
+use super::spheres::{Spheres, SquaredDistances};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
@@ -62,17 +62,17 @@ pub fn grains(ctx: &Context, centres: &[DVec3], radius: f64, voxel: f64) -> Resu
     let mut grid = FloatGrid::new(voxel, 0.0)?;
     let cubes: Vec<[i32; 3]> = spheres.cubes().collect();
     let (full, falloff) = (full as f32, (full * FALLOFF) as f32);
-    let density = |squares: Squares| {
-        let values = Box::new(squares.values.map(|square| falling((square.sqrt() - full) / falloff)));
+    let density = |squares: SquaredDistances| {
+        let values = Box::new(squares.values.map(|square| smooth_falloff((square.sqrt() - full) / falloff)));
         dense(squares.origin, values)
     };
-    let blocks = |cube: &[i32; 3]| spheres.squares(*cube).into_iter().filter_map(density).collect();
+    let blocks = |cube: &[i32; 3]| spheres.squared_distances(*cube).into_iter().filter_map(density).collect();
     fill(ctx, &mut grid, EDGE, &cubes, blocks)?;
     finished(grid)
 }
 
 /// The density at a distance outside the spheres (in widths of the falloff).
-fn falling(outside: f32) -> f32 {
+fn smooth_falloff(outside: f32) -> f32 {
     let left = (1.0 - outside).clamp(0.0, 1.0);
     left * left * (3.0 - 2.0 * left)
 }

@@ -20,7 +20,7 @@ use crate::vdb::FloatGrid;
 use rayon::prelude::*;
 
 /// Blocks in memory at once, in addition to the grid that they are put into: 64 MB.
-const AT_ONCE: usize = 1 << 15;
+const MAX_BLOCKS: usize = 1 << 15;
 
 /// Builds the blocks of some cubes, `edge` blocks wide, in parallel and puts them into a grid.
 fn fill<T: Sync>(
@@ -30,11 +30,11 @@ fn fill<T: Sync>(
     cubes: &[T],
     blocks: impl Fn(&T) -> Vec<BlockEdit> + Sync,
 ) -> Result<()> {
-    let some = (AT_ONCE / edge.pow(3)).max(1);
-    ctx.expect(cubes.len().div_ceil(some));
-    for some in cubes.chunks(some) {
+    let batch = (MAX_BLOCKS / edge.pow(3)).max(1);
+    ctx.expect(cubes.len().div_ceil(batch));
+    for batch in cubes.chunks(batch) {
         ctx.check()?;
-        let made: Vec<Vec<BlockEdit>> = ctx.pool().install(|| some.par_iter().map(&blocks).collect());
+        let made: Vec<Vec<BlockEdit>> = ctx.pool().install(|| batch.par_iter().map(&blocks).collect());
         let made: Vec<BlockEdit> = made.into_iter().flatten().collect();
         grid.replace_blocks(ctx, &made)?;
         ctx.advance();

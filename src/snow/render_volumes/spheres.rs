@@ -8,7 +8,7 @@ use crate::geometry::DVec3;
 use crate::numeric::blocks::{DIM, Origin, VOXELS, Values, offset};
 
 /// Maximum coordinate of a voxel.
-const FARTHEST: f64 = (1 << 30) as f64;
+const MAX_VOXEL: f64 = (1 << 30) as f64;
 
 /// Centres of spheres, sorted into cubes of blocks.
 pub struct Spheres {
@@ -22,8 +22,8 @@ pub struct Spheres {
     members: Vec<[f32; 3]>,
 }
 
-/// Squared distances (voxels) of a block's voxels from the nearest centre; beyond the reach they may be too large.
-pub struct Squares {
+/// Squared distances (voxels^2) of a block's voxels from the nearest centre; beyond the reach they may be too large.
+pub struct SquaredDistances {
     /// Minimum corner, in voxels.
     pub origin: Origin,
     /// The distances.
@@ -37,7 +37,7 @@ impl Spheres {
     /// A centre that is not finite, or is too far from the origin for voxels of this size; cancel.
     pub fn new(ctx: &Context, centres: &[DVec3], voxel: f64, reach: f64, edge: usize) -> Result<Self> {
         ctx.check()?;
-        let is_near = |centre: &DVec3| centre.iter().all(|x| (x / voxel).abs() < FARTHEST);
+        let is_near = |centre: &DVec3| centre.iter().all(|x| (x / voxel).abs() < MAX_VOXEL);
         if let Some(far) = centres.iter().position(|centre| !is_near(centre)) {
             return Err(Error::argument(format!(
                 "sphere {} of {} is not finite, or too far from the origin for voxels of {voxel} m",
@@ -83,8 +83,8 @@ impl Spheres {
         self.cubes.iter().map(|(cube, _)| *cube)
     }
 
-    /// The blocks of a cube within reach of a centre, by position.
-    pub fn squares(&self, cube: [i32; 3]) -> Vec<Squares> {
+    /// The squared distances in the blocks of a cube within reach of a centre, in ascending order of their origins.
+    pub fn squared_distances(&self, cube: [i32; 3]) -> Vec<SquaredDistances> {
         let Ok(index) = self.cubes.binary_search_by_key(&cube, |(cube, _)| *cube) else { return Vec::new() };
         let begin = if index == 0 { 0 } else { self.cubes[index - 1].1 };
         let mut blocks: Vec<Option<Box<Values>>> = vec![None; self.edge.pow(3)];
@@ -95,11 +95,13 @@ impl Spheres {
             let block = [index / self.edge.pow(2), index / self.edge % self.edge, index % self.edge];
             [0, 1, 2].map(|axis| (cube[axis] * self.edge as i32 + block[axis] as i32) * DIM as i32)
         };
-        let there = blocks.into_iter().enumerate();
-        there.filter_map(|(index, values)| Some(Squares { origin: origin(index), values: values? })).collect()
+        let indexed = blocks.into_iter().enumerate();
+        indexed
+            .filter_map(|(index, values)| Some(SquaredDistances { origin: origin(index), values: values? }))
+            .collect()
     }
 
-    /// Lowers the distances in the blocks of a cube to those from a centre.
+    /// Lowers the squared distances in the blocks of a cube to those from a centre.
     fn add(&self, blocks: &mut [Option<Box<Values>>], centre: [f32; 3]) {
         let last = (self.edge * DIM) as f32 - 1.0;
         let low = centre.map(|at| (at - self.reach).ceil().clamp(0.0, last) as usize);
@@ -110,15 +112,21 @@ impl Spheres {
                 for z in zs.clone() {
                     let values = &mut blocks[(x * self.edge + y) * self.edge + z];
                     let values = values.get_or_insert_with(|| Box::new([f32::INFINITY; VOXELS]));
-                    nearer(values, [x, y, z].map(|block| block * DIM), [low, high], centre, self.reach);
+                    lower_distances(
+                        values,
+                        [x, y, z].map(|block| block * DIM),
+                        [low, high],
+                        centre,
+                        self.reach,
+                    );
                 }
             }
         }
     }
 }
 
-/// Lowers the distances of a block's voxels, from `low` to `high`, to those from a centre; all in voxels of the cube.
-fn nearer(
+/// Lowers the squared distances of a block's voxels, from `low` to `high`, to those from a centre; all in voxels of the cube.
+fn lower_distances(
     values: &mut Values,
     origin: [usize; 3],
     [low, high]: [[usize; 3]; 2],

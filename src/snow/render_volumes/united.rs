@@ -5,7 +5,7 @@
 //! becomes a cube of whole blocks.
 
 use super::fill;
-use super::spheres::{Spheres, Squares};
+use super::spheres::{Spheres, SquaredDistances};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
@@ -55,12 +55,13 @@ pub fn unite(ctx: &Context, base: &FloatGrid, centres: &[DVec3], radius: f64) ->
     cubes.extend(spheres.cubes());
     cubes.sort_unstable();
     cubes.dedup();
-    let origins: Vec<Origin> = cubes.iter().flat_map(|cube| around(*cube)).collect();
+    let origins: Vec<Origin> = cubes.iter().flat_map(|cube| adjacent_leaves(*cube)).collect();
     let probes = base.probe(&origins)?;
     let cubes: Vec<([i32; 3], &[Probe<'_>])> = cubes.into_iter().zip(probes.chunks_exact(DIM)).collect();
     let fine = Fine { division, voxel: voxel as f32, grown: grown as f32 };
-    let blocks =
-        |(cube, probes): &([i32; 3], &[Probe<'_>])| fine.blocks(*cube, probes, spheres.squares(*cube));
+    let blocks = |(cube, probes): &([i32; 3], &[Probe<'_>])| {
+        fine.blocks(*cube, probes, spheres.squared_distances(*cube))
+    };
     fill(ctx, &mut grid, division, &cubes, blocks)?;
     grid.flood_fill()?;
     grid.set_name("surface")?;
@@ -68,7 +69,7 @@ pub fn unite(ctx: &Context, base: &FloatGrid, centres: &[DVec3], radius: f64) ->
 }
 
 /// The origins of a leaf and of the seven adjacent leaves in the positive directions.
-fn around(leaf: [i32; 3]) -> impl Iterator<Item = Origin> {
+fn adjacent_leaves(leaf: [i32; 3]) -> impl Iterator<Item = Origin> {
     (0..DIM as i32)
         .map(move |corner| [0, 1, 2].map(|axis| (leaf[axis] + (corner >> (2 - axis) & 1)) * DIM as i32))
 }
@@ -79,13 +80,13 @@ struct Fine {
     division: usize,
     /// Edge of a voxel (m).
     voxel: f32,
-    /// Radius of a grain (voxels).
+    /// Radius of a grown grain (voxels).
     grown: f32,
 }
 
 impl Fine {
     /// The blocks of a cube that are near the surface: `probes` are the base's leaf there and the seven after it.
-    fn blocks(&self, cube: [i32; 3], probes: &[Probe<'_>], squares: Vec<Squares>) -> Vec<BlockEdit> {
+    fn blocks(&self, cube: [i32; 3], probes: &[Probe<'_>], squares: Vec<SquaredDistances>) -> Vec<BlockEdit> {
         let cells = Cells::of(probes);
         let mut squares = squares.into_iter().peekable();
         let mut out = Vec::new();
@@ -108,7 +109,7 @@ impl Fine {
         origin: Origin,
         block: [usize; 3],
         cells: &Cells,
-        of_grains: Option<Squares>,
+        of_grains: Option<SquaredDistances>,
     ) -> Option<BlockEdit> {
         let width = HALF_WIDTH * self.voxel;
         let (low, high) = cells.range(self.division, block);

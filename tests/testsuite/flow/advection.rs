@@ -1,7 +1,7 @@
 //! Advection: what is carried, how far and how sharp.
 
 use frazil::flow::tiles::padded;
-use frazil::flow::{Flow, Keeping, Scheme};
+use frazil::flow::{Flow, MassConservation, Scheme};
 use frazil::{Context, Pool};
 
 /// Centre (cells) and mass of a ball of density that a wind of 3.3 cells a step carried for some steps, and its greatest value.
@@ -59,7 +59,7 @@ fn a_ball_moves_with_the_wind() {
 
 /// Sums of the density around two vortices far apart, of which one turns and the other one stands still; after some steps in which
 /// density keeps a share of its mass.
-fn two_balls(steps: usize, keeping: Keeping) -> ([f64; 2], f32) {
+fn two_balls(steps: usize, conservation: MassConservation) -> ([f64; 2], f32) {
     let ctx = Context::new(Pool::new(2).unwrap());
     let mut flow = Flow::new(1.0, [0.0; 3]).unwrap();
     let mut tiles = padded(&[[-6, 0, 0], [6, 0, 0]], 2);
@@ -89,7 +89,7 @@ fn two_balls(steps: usize, keeping: Keeping) -> ([f64; 2], f32) {
         }
     }
     for _ in 0..steps {
-        ctx.phase("advect", || flow.advect_keeping(&ctx, 1.0, keeping)).unwrap();
+        ctx.phase("advect", || flow.advect_conserving(&ctx, 1.0, conservation)).unwrap();
     }
     let (mut sums, mut most) = ([0.0; 2], 0.0f32);
     for (coord, tile) in flow.tiles().coords().iter().zip(flow.density()) {
@@ -104,7 +104,7 @@ fn two_balls(steps: usize, keeping: Keeping) -> ([f64; 2], f32) {
 
 #[test]
 fn mass_that_is_lost_is_put_back_where_it_was() {
-    let all = Keeping { share: 1.0, least: 0.01 };
+    let all = MassConservation { kept_share: 1.0, fade_below: 0.01 };
     let (start, _) = two_balls(0, all);
     let (end, most) = two_balls(30, all);
     for side in 0..2 {
@@ -114,10 +114,10 @@ fn mass_that_is_lost_is_put_back_where_it_was() {
     let [all_then, all_now] = [start, end].map(|sums| sums[0] + sums[1]);
     assert!((all_now / all_then - 1.0).abs() < 1.0e-5, "{end:?} {start:?}");
     assert!(most < 1.15, "{most}");
-    let (end, _) = two_balls(30, Keeping { share: 0.95, ..all });
+    let (end, _) = two_balls(30, MassConservation { kept_share: 0.95, ..all });
     let wanted = start.map(|mass| mass * 0.95f64.powi(30));
     assert!((0..2).all(|side| (end[side] / wanted[side] - 1.0).abs() < 2.0e-3), "{end:?} {wanted:?}");
     // The last of it is cut off, and does not come back.
-    let (end, _) = two_balls(40, Keeping { share: 0.7, ..all });
+    let (end, _) = two_balls(40, MassConservation { kept_share: 0.7, ..all });
     assert_eq!(end, [0.0; 2]);
 }

@@ -85,7 +85,8 @@ fn solids_that_move_into_each_other_leave_the_air_around_them_solvable() {
 /// Open share of a face of a cell: the lower one on each axis, then the upper ones.
 fn open_share(tiles: &Tiles, solids: &Solids, slot: usize, cell: usize, face: usize) -> f32 {
     let axis = face % 3;
-    let (slot, cell) = if face < 3 { (slot as u32, cell) } else { tiles.beside(slot, cell, axis, true) };
+    let (slot, cell) =
+        if face < 3 { (slot as u32, cell) } else { tiles.adjacent_cell(slot, cell, axis, true) };
     solids.faces(slot as usize).map_or(1.0, |faces| faces.open[axis][cell])
 }
 

@@ -181,7 +181,7 @@ fn a_layer_that_remembers_its_changed_blocks_gives_the_same_grains() {
 #[test]
 fn loose_grains_are_added_or_refused_all_together() {
     let ctx = context(1);
-    let mut grains = Grains::new(Params { most: 4, ..params() }).unwrap();
+    let mut grains = Grains::new(Params { max_grains: 4, ..params() }).unwrap();
     let at = |x: f64| DVec3::new(x, 1.0, 0.0);
     assert_eq!(grains.emit(&[at(0.0), at(1.0)], &[], 3).unwrap(), 0);
     assert_eq!(grains.emit(&[at(2.0)], &[[1.0, 2.0, 3.0]], 5).unwrap(), 2);
@@ -217,7 +217,7 @@ fn loose_grains_are_added_or_refused_all_together() {
 fn too_many_grains_are_refused_and_leave_the_others_as_they_were() {
     let ctx = context(2);
     let story = story(&ctx);
-    let mut grains = Grains::new(Params { most: 200, ..params() }).unwrap();
+    let mut grains = Grains::new(Params { max_grains: 200, ..params() }).unwrap();
     run(&ctx, &story, &mut grains, 1..=3);
     let before = grains.save();
     let around = on_floor(Base::Whole([&story.layers[3], &story.layers[FRAMES as usize]]), &[]);

@@ -4,7 +4,7 @@ use frazil::flow::{Faces, Solids, Tiles};
 use frazil::geometry::DVec3;
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
-use frazil::snow::mist::{Around, Boundary, Grids, Mist, Params, Source, Start, Surroundings, Wind};
+use frazil::snow::mist::{Boundary, Grids, Mist, Params, Source, Start, StepInputs, Surroundings, Wind};
 use frazil::sweep::Body;
 use frazil::{Context, Error};
 
@@ -19,8 +19,8 @@ fn open(tiles: &Tiles, _: f32, _: f64) -> frazil::Result<Solids> {
 }
 
 /// Around mist: grains, and what else there is.
-fn around<'a>(sources: &'a [Source], boundary: &'a Boundary<'a>) -> Around<'a> {
-    Around { sources, boundary, fastest: 0.0, wind: None }
+fn around<'a>(sources: &'a [Source], boundary: &'a Boundary<'a>) -> StepInputs<'a> {
+    StepInputs { sources, boundary, fastest: 0.0, wind: None }
 }
 
 fn times(frame: i32) -> [f64; 2] {
@@ -183,7 +183,7 @@ fn busy(threads: usize, frames: std::ops::Range<i32>, state: Option<&[u8]>) -> M
             Ok(positions.iter().map(|at| [at.y as f32, 0.0, 1.0]).collect())
         };
         let around =
-            Around { sources: &sources, boundary: &boundary, fastest: 1.0, wind: Some(&Wind(&wind)) };
+            StepInputs { sources: &sources, boundary: &boundary, fastest: 1.0, wind: Some(&Wind(&wind)) };
         let report = mist.step(&ctx, &around, times(frame)).unwrap();
         assert!(report.divergence < 1e-4 && report.mass > 0.0 && report.sub_steps > 1, "{report:?}");
         assert!(report.fastest < 20.0, "{report:?}");
@@ -263,11 +263,11 @@ fn what_a_step_cannot_take_is_named() {
     refuses(grain([0.0; 3], [0.0, 1e7, 0.0]), "mist moves at");
     let nan = |_: &Context, positions: &[DVec3]| Ok(vec![[f32::NAN; 3]; positions.len()]);
     let source = [grain([0.0; 3], [0.0, 5.0, 0.0])];
-    let around = Around { wind: Some(&Wind(&nan)), ..around(&source, &open) };
+    let around = StepInputs { wind: Some(&Wind(&nan)), ..around(&source, &open) };
     let error = mist.step(&ctx, &around, times(0)).unwrap_err().to_string();
     assert!(error.contains("the wind at (") && error.contains("1000 m/s"), "{error}");
     let storm = |_: &Context, positions: &[DVec3]| Ok(vec![[0.0, 1.0e20, 0.0]; positions.len()]);
-    let around = Around { wind: Some(&Wind(&storm)), ..around };
+    let around = StepInputs { wind: Some(&Wind(&storm)), ..around };
     assert!(mist.step(&ctx, &around, times(0)).unwrap_err().to_string().contains("1000 m/s"));
     assert!(mist.step(&ctx, &around, [1.0, 1.0]).is_err());
     for params in [
@@ -310,7 +310,7 @@ fn wind_carries_mist_and_a_field_of_it_draws_it_along() {
         let field = Wind(&sample);
         for frame in 0..12 {
             let wind = (wind == [0.0; 3]).then_some(&field);
-            mist.step(&ctx, &Around { wind, ..around(&[], &open) }, times(frame)).unwrap();
+            mist.step(&ctx, &StepInputs { wind, ..around(&[], &open) }, times(frame)).unwrap();
         }
         middle(&mist) - start
     };
@@ -344,7 +344,7 @@ fn mirrored_winds_make_mirrored_mist() {
         };
         let field = Wind(&sample);
         for frame in 0..6 {
-            mist.step(&ctx, &Around { wind: Some(&field), ..around(&[], &open) }, times(frame)).unwrap();
+            mist.step(&ctx, &StepInputs { wind: Some(&field), ..around(&[], &open) }, times(frame)).unwrap();
         }
         mist
     };

@@ -1,7 +1,7 @@
 //! Gate of turbulence: eddies change with time, and do not only move.
 
 use frazil::Context;
-use frazil::snow::mist::{Around, Mist, Params};
+use frazil::snow::mist::{Mist, Params, StepInputs};
 
 use crate::scenes::context;
 use crate::snow::mist::open;
@@ -24,7 +24,7 @@ fn eddies(ctx: &Context, time: f64) -> Vec<[f32; 3]> {
     let tiles: Vec<[i32; 3]> =
         (0..5).flat_map(|x| (0..5).flat_map(move |y| (0..5).map(move |z| [x, y, z]))).collect();
     mist.add(&tiles, |_| (1.0, [0.0; 3]));
-    let around = Around { sources: &[], boundary: &open, fastest: 0.0, wind: None };
+    let around = StepInputs { sources: &[], boundary: &open, fastest: 0.0, wind: None };
     mist.step(ctx, &around, [time, time + 1.0e-3]).expect("a step");
     let flow = mist.flow();
     let at = |x: usize, y: usize, z: usize| {

@@ -3,7 +3,7 @@
 use frazil::Context;
 use frazil::flow::Tiles;
 use frazil::geometry::DVec3;
-use frazil::snow::mist::{Around, Mist, Params, Source, Start, Surroundings};
+use frazil::snow::mist::{Mist, Params, Source, Start, StepInputs, Surroundings};
 
 use crate::common::shapes::cuboid;
 use crate::scenes::{EXACT, body, context, layer};
@@ -120,11 +120,11 @@ fn made(ctx: &Context, flights: &[Flight], fps: f64, plough: bool) -> Vec<Mist> 
                 let walls = around.during(times, CELL).expect("poses");
                 let boundary = |tiles: &Tiles, cell: f32, share: f64| walls.faces(ctx, tiles, cell, share);
                 let fastest = walls.fastest_near(&mist, &sources);
-                let around = Around { sources: &sources, boundary: &boundary, fastest, wind: None };
+                let around = StepInputs { sources: &sources, boundary: &boundary, fastest, wind: None };
                 mist.step(ctx, &around, times).expect("a step");
             }
             None => {
-                let around = Around { sources: &sources, boundary: &open, fastest: 0.0, wind: None };
+                let around = StepInputs { sources: &sources, boundary: &open, fastest: 0.0, wind: None };
                 mist.step(ctx, &around, times).expect("a step");
             }
         }
@@ -162,7 +162,7 @@ fn in_blocks(mist: &Mist) -> std::collections::BTreeMap<[i32; 3], [f64; 4]> {
         for (cell, density) in tile.iter().enumerate().filter(|(_, density)| **density > 0.0) {
             sums[0] += f64::from(*density);
             for axis in 0..3 {
-                let (above, upper) = flow.tiles().beside(slot, cell, axis, true);
+                let (above, upper) = flow.tiles().adjacent_cell(slot, cell, axis, true);
                 let velocity = &flow.velocity()[axis];
                 sums[1 + axis] +=
                     f64::from(*density * 0.5 * (velocity[slot][cell] + velocity[above as usize][upper]));

@@ -12,7 +12,7 @@ use frazil::Context;
 use frazil::flow::tiles::{padded, shifted};
 use frazil::flow::{Coord, Faces, Flow, Scheme, Solids, Tile, Tiles};
 use frazil::geometry::DVec3;
-use frazil::snow::mist::{Around, Boundary, Mist, Params, Source, StepReport};
+use frazil::snow::mist::{Boundary, Mist, Params, Source, StepInputs, StepReport};
 
 use crate::harness::Harness;
 use crate::process::kilobytes;
@@ -45,7 +45,7 @@ pub fn step(
     frame: i32,
 ) -> StepReport {
     let times = [f64::from(frame) * FRAME, f64::from(frame + 1) * FRAME];
-    let around = Around { sources, boundary, fastest: 0.0, wind: None };
+    let around = StepInputs { sources, boundary, fastest: 0.0, wind: None };
     mist.step(ctx, &around, times).expect("a step")
 }
 

@@ -4,7 +4,7 @@ use frazil::flow::tiles::shifted;
 use frazil::flow::{Coord, Flow, Solids, Tiles};
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Key, Keys, Rigid};
-use frazil::snow::mist::{Around, Mist, Params, Surroundings};
+use frazil::snow::mist::{Mist, Params, StepInputs, Surroundings};
 use frazil::sweep::Body;
 
 use crate::common::shapes::cuboid;
@@ -44,7 +44,7 @@ fn flux() -> (f64, String) {
         let around = Surroundings { base: None, bodies: &[&body], removing: &[], floor: None };
         let walls = around.during(times, CELL).expect("poses");
         let boundary = |tiles: &Tiles, cell: f32, share: f64| walls.faces(&ctx, tiles, cell, share);
-        let around = Around { sources: &[], boundary: &boundary, fastest: SPEED, wind: None };
+        let around = StepInputs { sources: &[], boundary: &boundary, fastest: SPEED, wind: None };
         mist.step(&ctx, &around, times).expect("a step");
     }
     let way = SPEED * f64::from(FRAMES) * FRAME;

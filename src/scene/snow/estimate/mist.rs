@@ -13,7 +13,7 @@ use crate::scene::Scene;
 use crate::scene::run::Stored;
 use crate::scene::snow::inspect::object_path::ObjectPath;
 use crate::scene::snow::keys::mist::mist_params;
-use crate::snow::mist::{self, LEAST, Params};
+use crate::snow::mist::{self, MIN_DENSITY, Params};
 use crate::vdb::file;
 
 /// Cells along the edge of a tile, and in a tile. Air is computed in whole tiles, plus one more layer around those that hold mist.
@@ -152,7 +152,7 @@ fn in_boxes(ctx: &Context, scene: &Scene, courses: &[ObjectPath], params: &Param
     let count = frames.count();
     let each = count.div_ceil(MOMENTS).max(1);
     // From full density to the density that counts as none.
-    let lasts = params.half_life * libm::log2(1.0 / f64::from(LEAST)) * fps;
+    let lasts = params.half_life * libm::log2(1.0 / f64::from(MIN_DENSITY)) * fps;
     let lasts = (lasts.ceil() as usize).min(count);
     let tile = EDGE * params.cell;
     let of_air = |(frame, [low, high]): (i32, [DVec3; 2])| {

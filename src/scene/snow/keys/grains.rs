@@ -21,7 +21,7 @@ pub const GRAIN_KEYS: &[Key] = &[
     key(STEP, "grains", "compression", Number(0.0, 1.0, ""), or("0.75"))
         .with_presets(&[("powder", "0.8"), ("packed", "0.5"), ("wet", "0.7")])
         .means("share of the removed snow that is compressed and does not become grains"),
-    key(STEP, "grains", "repose_angle_deg", Number(0.0, grain_friction::STEEPEST, "degrees"), or("32.0"))
+    key(STEP, "grains", "repose_angle_deg", Number(0.0, grain_friction::MAX_REPOSE, "degrees"), or("32.0"))
         .with_presets(&[("powder", "36.0"), ("packed", "38.0"), ("wet", "34.0")])
         .means("slope at which a poured pile comes to rest"),
     key(STEP, "grains", "stands", Number(0.0, 1000.0, "m"), or("0.0"))

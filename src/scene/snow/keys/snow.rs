@@ -113,7 +113,7 @@ impl Snow {
     /// Noise that would leave islands.
     pub(in crate::scene) fn check_noise(table: &Table, values: &Values) -> Result<()> {
         let Some(noise) = noise(values) else { return Ok(()) };
-        let most = noise.steepest();
+        let most = noise.max_amplitude();
         if noise.amplitude <= most {
             return Ok(());
         }
@@ -142,7 +142,7 @@ impl Snow {
         }
         let mut noise = self.noise;
         noise.size = noise.size.max(*NoiseParams::sizes(cell).start());
-        noise.amplitude = noise.amplitude.min(noise.steepest());
+        noise.amplitude = noise.amplitude.min(noise.max_amplitude());
         values.set_number("snow.cell", cell);
         values.set_number("snow.noise.size", noise.size);
         values.set_number("snow.noise.amplitude", noise.amplitude);

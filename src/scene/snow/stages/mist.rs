@@ -21,7 +21,7 @@ use crate::scene::snow::keys::mist::mist_params;
 use crate::scene::snow::wind::wind_file;
 use crate::scene::vdb_metadata::metadata;
 use crate::scene::{Scene, moving};
-use crate::snow::mist::{self, Around, Grids, Params, Source, Start, StepReport, Surroundings, Wind};
+use crate::snow::mist::{self, Grids, Params, Source, Start, StepInputs, StepReport, Surroundings, Wind};
 use crate::sweep::Body;
 use crate::vdb::file::{self, WriteOptions, any_to_bytes};
 use crate::vdb::{FloatGrid, GridRef};
@@ -124,7 +124,7 @@ impl Mist<'_> {
         };
         let wind = self.inputs.wind.as_ref().map(|_| Wind(&sample));
         let fastest = walls.fastest_near(mist, &sources);
-        let around = Around { sources: &sources, boundary: &boundary, fastest, wind: wind.as_ref() };
+        let around = StepInputs { sources: &sources, boundary: &boundary, fastest, wind: wind.as_ref() };
         mist.step(ctx, &around, times).map_err(|error| self.with_path(error))
     }
 }

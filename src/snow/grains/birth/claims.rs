@@ -1,5 +1,5 @@
-//! Decides which object took the snow at a position when objects have different compression: the one whose surface comes
-//! nearest to the position at the start, the end or one of the moments between (`MOMENTS`); the first of equals.
+//! Decides which object removed the snow at a position when objects have different compression: the one whose surface comes
+//! nearest to the position at one of `MOMENTS` moments from the start to the end of the step; the first of equals.
 
 use crate::error::Result;
 use crate::geometry::DVec3;
@@ -86,7 +86,7 @@ impl ClaimsHere<'_> {
             for mesh in &claim.meshes {
                 // Only surfaces nearer than the best so far.
                 if let Some(distance) =
-                    mesh.distance(position, best.0.min(FARTHEST)).filter(|near| *near < best.0)
+                    mesh.distance(position, best.0.min(MAX_DISTANCE)).filter(|near| *near < best.0)
                 {
                     best = (distance, claim.share);
                 }
@@ -97,16 +97,17 @@ impl ClaimsHere<'_> {
 }
 
 /// Search distance for surfaces (m).
-const FARTHEST: f64 = 1.0e6;
+const MAX_DISTANCE: f64 = 1.0e6;
 /// Margin around the box of an object, for its noise (share of a block).
-const AROUND: f64 = 0.5;
+const MARGIN: f64 = 0.5;
 
 impl Claim {
     /// Whether the object may have taken snow in a box.
     fn reaches(&self, [low, high]: &Bounds) -> bool {
-        let room = (high - low) * AROUND;
+        let margin = (high - low) * MARGIN;
         (0..3).all(|axis| {
-            self.bounds[0][axis] <= high[axis] + room[axis] && self.bounds[1][axis] >= low[axis] - room[axis]
+            self.bounds[0][axis] <= high[axis] + margin[axis]
+                && self.bounds[1][axis] >= low[axis] - margin[axis]
         })
     }
 }

@@ -92,7 +92,7 @@ impl<'a> Base<'a> {
     ///
     /// # Errors
     /// When a grid cannot be read; when memory runs out.
-    pub fn taken(&self, ctx: &Context) -> Result<Option<(Before<'a>, Vec<Removal>)>> {
+    pub fn removed(&self, ctx: &Context) -> Result<Option<(Before<'a>, Vec<Removal>)>> {
         match *self {
             Self::Missing => Ok(None),
             Self::Whole([before, after]) => Ok(Some((Before::Whole(before), removals(before, after)?))),

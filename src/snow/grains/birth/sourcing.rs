@@ -29,13 +29,13 @@ struct Site {
     share: f64,
     /// Sites are chosen in ascending order of this random number, which makes the choice proportional to the shares
     /// (exponential race).
-    turn: f64,
+    priority: f64,
 }
 
 impl Site {
     fn new(hash: u64, position: DVec3, share: f64) -> Self {
         let random = (hash >> 11) as f64 / (1u64 << 53) as f64;
-        Self { hash, position, share, turn: -libm::log1p(-random) / share }
+        Self { hash, position, share, priority: -libm::log1p(-random) / share }
     }
 }
 
@@ -104,7 +104,7 @@ impl Sourcing {
             sites.retain(|site| site.share > 0.0);
             let count = (paid.floor().max(0.0) as usize).min(sites.len());
             // A random choice that does not depend on the order of computation.
-            sites.sort_unstable_by(|a, b| a.turn.total_cmp(&b.turn).then(a.hash.cmp(&b.hash)));
+            sites.sort_unstable_by(|a, b| a.priority.total_cmp(&b.priority).then(a.hash.cmp(&b.hash)));
             out.extend(sites[..count].iter().map(|site| site.position));
             let left = paid - count as f64;
             if left != 0.0 {

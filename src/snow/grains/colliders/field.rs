@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::touch::{BASE, Touch};
 use crate::error::Result;
 use crate::numeric::blocks::{DIM, offset};
-use crate::snow::grains::solver::blocks::{At, Block, EDGE};
+use crate::snow::grains::solver::blocks::{Block, BlockIndex, EDGE};
 use crate::snow::grains::solver::layout::Layout;
 use crate::snow::grains::solver::pairs::SKIN;
 use crate::snow::grains::solver::rows::{Row, V, dot, norm, scaled};
@@ -24,7 +24,12 @@ impl Field<'_> {
     ///
     /// # Errors
     /// Errors of the grid.
-    pub fn windows(&self, blocks: &[At], diameter: f64, margin: f64) -> Result<Vec<Option<Window<'_>>>> {
+    pub fn windows(
+        &self,
+        blocks: &[BlockIndex],
+        diameter: f64,
+        margin: f64,
+    ) -> Result<Vec<Option<Window<'_>>>> {
         let cell = self.grid.voxel_size();
         let bounds: Vec<[[i32; 3]; 2]> = blocks
             .par_iter()
@@ -42,14 +47,14 @@ impl Field<'_> {
 }
 
 /// A level set with a cached copy of the values around each block.
-pub struct Seen<'a> {
+pub struct CachedField<'a> {
     field: &'a Field<'a>,
     /// By block; none until it is first needed.
     patches: Vec<Option<Patch>>,
     diameter: f64,
 }
 
-impl<'a> Seen<'a> {
+impl<'a> CachedField<'a> {
     /// An empty cache, for grains of a diameter (m).
     pub fn new(field: &'a Field<'a>, diameter: f64) -> Self {
         Self { field, patches: Vec::new(), diameter }
@@ -67,7 +72,7 @@ impl<'a> Seen<'a> {
         rows: &[Row],
         reach: f32,
     ) -> Result<Vec<Vec<Touch>>> {
-        self.see(layout, which)?;
+        self.load_patches(layout, which)?;
         let near = which.par_iter().with_max_len(8).map(|&index| {
             let (block, patch) = (&layout.blocks[index as usize], &self.patches[index as usize]);
             let Some(patch) = patch.as_ref().filter(|patch| !patch.values.is_empty()) else {
@@ -80,19 +85,19 @@ impl<'a> Seen<'a> {
     }
 
     /// Copies the values around blocks that are not in the cache yet.
-    fn see(&mut self, layout: &Layout, which: &[u32]) -> Result<()> {
+    fn load_patches(&mut self, layout: &Layout, which: &[u32]) -> Result<()> {
         self.patches.resize_with(layout.blocks.len(), || None);
         let is_new = |index: &&u32| self.patches[**index as usize].is_none();
         let new: Vec<u32> = which.iter().filter(is_new).copied().collect();
         let cell = self.field.grid.voxel_size();
-        let blocks: Vec<At> = new.iter().map(|&index| layout.blocks[index as usize].at).collect();
-        let windows = self.field.windows(&blocks, self.diameter, ROOM * self.diameter / cell + 2.0)?;
-        let (edge, room) = (f64::from(EDGE) * self.diameter / cell, ROOM * self.diameter / cell);
+        let blocks: Vec<BlockIndex> = new.iter().map(|&index| layout.blocks[index as usize].at).collect();
+        let windows = self.field.windows(&blocks, self.diameter, MARGIN * self.diameter / cell + 2.0)?;
+        let (edge, margin) = (f64::from(EDGE) * self.diameter / cell, MARGIN * self.diameter / cell);
         let patch = |(&index, window): (&u32, Option<Window<'_>>)| {
             let Some(window) = window else { return Patch::default() };
             let at = layout.blocks[index as usize].at.map(f64::from);
-            let low = at.map(|at| (at * edge - room).floor() as i32);
-            Patch::of(&window, low, at.map(|at| ((at + 1.0) * edge + room).floor() as i32 + 2))
+            let low = at.map(|at| (at * edge - margin).floor() as i32);
+            Patch::of(&window, low, at.map(|at| ((at + 1.0) * edge + margin).floor() as i32 + 2))
         };
         let made: Vec<Patch> = new.par_iter().zip(windows).map(patch).collect();
         new.iter().zip(made).for_each(|(&index, patch)| self.patches[index as usize] = Some(patch));
@@ -100,20 +105,20 @@ impl<'a> Seen<'a> {
     }
 
     /// Distance (diameters) of a member of the block with this index from the surface; none where no surface is near the block.
-    pub fn distance(&self, index: usize, at: At, position: V) -> Option<f32> {
+    pub fn distance(&self, index: usize, at: BlockIndex, position: V) -> Option<f32> {
         let patch = self.patches.get(index)?.as_ref().filter(|patch| !patch.values.is_empty())?;
         Some(patch.sample(self.voxel(at, position)).0 / self.diameter as f32)
     }
 
     /// A position in a block, in voxels.
-    fn voxel(&self, at: At, position: V) -> [f64; 3] {
+    fn voxel(&self, at: BlockIndex, position: V) -> [f64; 3] {
         let scale = self.diameter / self.field.grid.voxel_size();
         [0, 1, 2].map(|axis| (f64::from(at[axis]) * f64::from(EDGE) + f64::from(position[axis])) * scale)
     }
 
     fn touch(&self, block: &Block, slot: u32, row: &Row, patch: &Patch, reach: f32) -> Option<Touch> {
         let near = 0.5 + SKIN + norm(row.velocity) * reach;
-        if patch.least / self.diameter as f32 > near {
+        if patch.min / self.diameter as f32 > near {
             return None;
         }
         let (distance, gradient) = patch.sample(self.voxel(block.at, row.position));
@@ -121,9 +126,9 @@ impl<'a> Seen<'a> {
         if distance > near {
             return None;
         }
-        let steep = norm(gradient);
+        let slope = norm(gradient);
         // Deep in the level set the gradient is 0: the touch has no plane and only records that the grain is inside.
-        let normal = if steep < 1.0e-6 { [0.0; 3] } else { scaled(gradient, 1.0 / steep) };
+        let normal = if slope < 1.0e-6 { [0.0; 3] } else { scaled(gradient, 1.0 / slope) };
         Some(Touch {
             grain: slot,
             collider: BASE,
@@ -136,7 +141,7 @@ impl<'a> Seen<'a> {
 }
 
 /// Margin around a block (diameters) for grains that have left it since it was sorted.
-const ROOM: f64 = 1.0;
+const MARGIN: f64 = 1.0;
 
 /// Values of a level set around a block; empty where no surface is near.
 #[derive(Default)]
@@ -146,7 +151,7 @@ struct Patch {
     /// Number of voxels along each axis.
     size: [usize; 3],
     values: Vec<f32>,
-    least: f32,
+    min: f32,
 }
 
 impl Patch {
@@ -157,8 +162,8 @@ impl Patch {
         for (x, y) in (low[0]..end[0]).flat_map(|x| (low[1]..end[1]).map(move |y| (x, y))) {
             values.extend((low[2]..end[2]).map(|z| window.value([x, y, z])));
         }
-        let least = values.iter().copied().fold(f32::INFINITY, f32::min);
-        Self { low, size, values, least }
+        let min = values.iter().copied().fold(f32::INFINITY, f32::min);
+        Self { low, size, values, min }
     }
 
     /// Value, and gradient per voxel, at a position (voxels).

@@ -23,14 +23,14 @@ impl Ground {
     pub fn new(mesh: &TriMesh) -> Self {
         let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
         let sides = Sides::of(&mesh.triangles, &positions);
-        let mut triangles = sides.turned(&mesh.triangles, &positions);
+        let mut triangles = sides.reoriented(&mesh.triangles, &positions);
         if sides.is_closed() && six_volumes(&triangles, &positions) < 0.0
             || !sides.is_closed() && area_up(&triangles, &positions) < 0.0
         {
             triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }
         let rims = |triangles: &[[u32; 3]]| Sides::of(triangles, &positions).rims(triangles.len());
-        Self { shell: Shell::in_front(FRICTION, triangles, rims, positions.clone()) }
+        Self { shell: Shell::ground(FRICTION, triangles, rims, positions.clone()) }
     }
 
     /// Whether a mesh bounds a solid, so that it can be ground: each of its edges lies between two faces.
@@ -92,7 +92,7 @@ impl Sides {
     }
 
     /// The triangles, flipped so that neighbours agree, with the original orientation of most of each component's area.
-    fn turned(&self, triangles: &[[u32; 3]], positions: &[DVec3]) -> Vec<[u32; 3]> {
+    fn reoriented(&self, triangles: &[[u32; 3]], positions: &[DVec3]) -> Vec<[u32; 3]> {
         let pairs = self.edges().filter_map(|sides| match sides {
             [a, b] => Some((a.triangle, b.triangle, a.runs_up == b.runs_up)),
             _ => None,
@@ -110,16 +110,16 @@ impl Sides {
                 continue;
             }
             turns[first] = Some(false);
-            let mut part = vec![first];
+            let mut component = vec![first];
             let mut next = 0;
-            while let Some(&at) = part.get(next) {
+            while let Some(&at) = component.get(next) {
                 next += 1;
                 let from = links.partition_point(|link| link.0 < at as u32);
                 for &(_, other, differ) in links[from..].iter().take_while(|link| link.0 == at as u32) {
                     let other = other as usize;
                     if turns[other].is_none() {
                         turns[other] = turns[at].map(|turn| turn != differ);
-                        part.push(other);
+                        component.push(other);
                     }
                 }
             }
@@ -128,9 +128,9 @@ impl Sides {
                 (b - a).cross(&(c - a)).norm()
             };
             let is_turned = |triangle: &&usize| turns[**triangle] == Some(true);
-            let turned: f64 = part.iter().filter(is_turned).map(area).sum();
-            let all: f64 = part.iter().map(area).sum();
-            for triangle in part {
+            let turned: f64 = component.iter().filter(is_turned).map(area).sum();
+            let all: f64 = component.iter().map(area).sum();
+            for triangle in component {
                 if turns[triangle] == Some(2.0 * turned <= all) {
                     out[triangle].swap(1, 2);
                 }

@@ -32,37 +32,39 @@ struct Boxes {
     /// Unused lanes are far away.
     sides: [[Lanes; 2]; 3],
     /// Largest displacement of a vertex in the sub-step (m).
-    ways: Lanes,
+    max_displacements: Lanes,
 }
 
 impl Nearby {
     /// Collects the leaves of a mesh that may be within a distance (m), plus their displacement, of positions in a box.
     pub fn find(&mut self, shell: &Shell, [low, high]: &[DVec3; 2], within: f64) {
-        let room = DVec3::repeat(within + shell.way);
-        let bounds = [low - room, high + room];
+        let margin = DVec3::repeat(within + shell.max_displacement);
+        let bounds = [low - margin, high + margin];
         self.which.clear();
         self.boxes.clear();
         self.triangles.clear();
         (self.within, self.middle) = (bounds, (bounds[0] + bounds[1]) * 0.5);
         (self.positions, self.far) = ([*low, *high], within);
-        shell.for_each_leaf(&[*low, *high], within, |leaf, bounds, way| self.push(leaf, bounds, way));
+        shell.for_each_leaf(&[*low, *high], within, |leaf, bounds, max_displacement| {
+            self.push(leaf, bounds, max_displacement)
+        });
     }
 
-    fn push(&mut self, leaf: u32, [low, high]: &[DVec3; 2], way: f64) {
+    fn push(&mut self, leaf: u32, [low, high]: &[DVec3; 2], max_displacement: f64) {
         let lane = self.which.len() % LANES;
         self.which.push(leaf);
         self.triangles.push(None);
         if lane == 0 {
-            self.boxes.push(Boxes { sides: [[Lanes::all(FAR); 2]; 3], ways: Lanes::all(0.0) });
+            self.boxes.push(Boxes { sides: [[Lanes::all(FAR); 2]; 3], max_displacements: Lanes::all(0.0) });
         }
-        let Some(Boxes { sides, ways }) = self.boxes.last_mut() else { return };
-        ways.0[lane] = (way * (1.0 + ROUNDING)) as f32;
-        let [least, greatest] = &self.within;
-        let room = ROUNDING * (greatest - least).max();
+        let Some(Boxes { sides, max_displacements }) = self.boxes.last_mut() else { return };
+        max_displacements.0[lane] = (max_displacement * (1.0 + ROUNDING)) as f32;
+        let [low_corner, high_corner] = &self.within;
+        let margin = ROUNDING * (high_corner - low_corner).max();
         for (axis, sides) in sides.iter_mut().enumerate() {
-            let side = |x: f64| x.clamp(least[axis], greatest[axis]) - self.middle[axis];
-            sides[0].0[lane] = (side(low[axis]) - room) as f32;
-            sides[1].0[lane] = (side(high[axis]) + room) as f32;
+            let side = |x: f64| x.clamp(low_corner[axis], high_corner[axis]) - self.middle[axis];
+            sides[0].0[lane] = (side(low[axis]) - margin) as f32;
+            sides[1].0[lane] = (side(high[axis]) + margin) as f32;
         }
     }
 
@@ -73,22 +75,22 @@ impl Nearby {
         if within > self.far || !(*low <= position && position <= *high) {
             return shell.nearest(position, within);
         }
-        let about = position - self.middle;
-        let about = [about.x as f32, about.y as f32, about.z as f32];
+        let relative = position - self.middle;
+        let relative = [relative.x as f32, relative.y as f32, relative.z as f32];
         let Self { which, boxes, triangles, reached, middle, .. } = self;
-        let room = (self.within[1] - self.within[0]).max();
-        reach(boxes, about, (within * (1.0 + ROUNDING)) as f32, reached);
-        let least = |a: usize, b: usize| if reached[b].1 < reached[a].1 { b } else { a };
-        let first = (0..reached.len()).reduce(least)?;
+        let size = (self.within[1] - self.within[0]).max();
+        reach(boxes, relative, (within * (1.0 + ROUNDING)) as f32, reached);
+        let nearer = |a: usize, b: usize| if reached[b].1 < reached[a].1 { b } else { a };
+        let first = (0..reached.len()).reduce(nearer)?;
         reached.swap(0, first);
         let mut best = Best::default();
         for &(index, apart) in &*reached {
-            if f64::from(apart) <= best.most {
+            if f64::from(apart) <= best.max_square {
                 let (index, leaf) = (index as usize, which[index as usize]);
                 let triangles =
-                    triangles[index].get_or_insert_with(|| Triangles::of(shell, leaf, *middle, room));
-                let way = f64::from(boxes[index / LANES].ways.0[index % LANES]);
-                triangles.compare(shell, leaf, (position, about), within + way, &mut best);
+                    triangles[index].get_or_insert_with(|| Triangles::of(shell, leaf, *middle, size));
+                let max_displacement = f64::from(boxes[index / LANES].max_displacements.0[index % LANES]);
+                triangles.compare(shell, leaf, (position, relative), within + max_displacement, &mut best);
             }
         }
         best.found.map(|found| shell.resolve(found, position))
@@ -114,20 +116,20 @@ struct Triangles {
 }
 
 impl Triangles {
-    fn of(shell: &Shell, leaf: u32, middle: DVec3, room: f64) -> Self {
+    fn of(shell: &Shell, leaf: u32, middle: DVec3, size: f64) -> Self {
         let mut corners = [[Lanes::all(FAR); 3]; 3];
         let mut largest = 0.0f64;
         for (lane, triangle) in shell.leaf_corners(leaf).enumerate() {
             for (corner, position) in corners.iter_mut().zip(triangle) {
-                let about = position - middle;
-                largest = largest.max(about.amax());
+                let relative = position - middle;
+                largest = largest.max(relative.amax());
                 for axis in 0..3 {
-                    corner[axis].0[lane] = about[axis] as f32;
+                    corner[axis].0[lane] = relative[axis] as f32;
                 }
             }
         }
         let mut out = prepared(&corners);
-        out.error = ROUNDING * (largest + room);
+        out.error = ROUNDING * (largest + size);
         out
     }
 
@@ -137,15 +139,15 @@ impl Triangles {
         &self,
         shell: &Shell,
         leaf: u32,
-        (position, about): (DVec3, [f32; 3]),
+        (position, relative): (DVec3, [f32; 3]),
         reach: f64,
         best: &mut Best,
     ) {
-        let squares = squares(self, about);
+        let squares = squares(self, relative);
         let square = reach * reach;
         let near = |best: &Best| {
-            let most = best.most.min(square).sqrt() + self.error;
-            squares.is_less(Lanes::all((most * most * (1.0 + ROUNDING)) as f32)).bits()
+            let max = best.max_square.min(square).sqrt() + self.error;
+            squares.is_less(Lanes::all((max * max * (1.0 + ROUNDING)) as f32)).bits()
         };
         let mut left = near(best);
         while left != 0 {
@@ -239,7 +241,7 @@ fn reach(boxes: &[Boxes], position: [f32; 3], within: f32, out: &mut Vec<(u32, f
 #[inline(always)]
 fn reach_of(boxes: &[Boxes], position: [f32; 3], within: f32, out: &mut Vec<(u32, f32)>) {
     out.clear();
-    for (first, Boxes { sides, ways }) in (0..).step_by(LANES).zip(boxes) {
+    for (first, Boxes { sides, max_displacements }) in (0..).step_by(LANES).zip(boxes) {
         let zero = Lanes::all(0.0);
         let mut square = zero;
         for (axis, [low, high]) in sides.iter().enumerate() {
@@ -247,8 +249,8 @@ fn reach_of(boxes: &[Boxes], position: [f32; 3], within: f32, out: &mut Vec<(u32
             let beyond = (*low - at).max(at - *high).max(zero);
             square = square + beyond * beyond;
         }
-        let most = Lanes::all(within) + *ways;
-        let mut near = square.is_less(most * most).bits();
+        let reach = Lanes::all(within) + *max_displacements;
+        let mut near = square.is_less(reach * reach).bits();
         while near != 0 {
             let lane = near.trailing_zeros();
             out.push((first + lane, square.0[lane as usize]));
@@ -273,7 +275,7 @@ mod tests {
         }
         let triangles = (0..90).map(|index| [3 * index, 3 * index + 1, 3 * index + 2]).collect();
         let mut shell = Shell::new(0.0, triangles, false, positions.clone());
-        shell.follow(&positions);
+        shell.advance(&positions);
         shell
     }
 

@@ -1,4 +1,4 @@
-//! Touches of a sub-step take the impulses of those before.
+//! Touches of a sub-step take over the impulses of the last one.
 
 use rayon::prelude::*;
 
@@ -59,7 +59,7 @@ fn release_pressed(touches: &mut [Touch]) {
             touches[..index].iter().any(|other| dot(touch.normal, other.normal) < OPPOSITE)
         });
         if is_pressed {
-            touches.iter_mut().for_each(|touch| (touch.impulse, touch.across) = (0.0, [0.0; 3]));
+            touches.iter_mut().for_each(|touch| (touch.impulse, touch.tangential) = (0.0, [0.0; 3]));
         }
     }
 }

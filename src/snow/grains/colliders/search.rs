@@ -13,13 +13,13 @@ use crate::snow::grains::solver::rows::{Row, Shared, V, dot, norm, scaled, sub};
 /// Scratch memory of one thread.
 #[derive(Default)]
 pub struct Scratch {
-    asking: Vec<Asking>,
+    queries: Vec<Query>,
     /// By mesh.
     nearby: Vec<Nearby>,
 }
 
 /// A grain that may touch a mesh.
-struct Asking {
+struct Query {
     slot: u32,
     /// Its position (m).
     position: DVec3,
@@ -37,13 +37,14 @@ pub struct Search<'a> {
     pub diameter: f64,
     /// Length of the sub-step (s).
     pub dt: f64,
-    /// Largest travel of the meshes in the step before this sub-step (diameters): the sum of [`Travel::most`].
+    /// Largest travel of the meshes in the step before this sub-step (diameters): the sum of [`Travel::max`].
     pub before: f64,
     /// The same in this sub-step.
     pub travel: Travel,
 }
 
-/// Travel of meshes in a sub-step: a common part, along which grains that ride on a mesh stay as near to it, and the rest.
+/// Travel of meshes in a sub-step: a common displacement, which leaves the distance of grains that ride on a mesh unchanged, and
+/// deviations.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Travel {
     /// Common displacement (diameters).
@@ -55,32 +56,31 @@ pub struct Travel {
 impl Travel {
     /// Travel of meshes, with grains of a diameter (m).
     pub fn of(shells: &[&Shell], diameter: f64) -> Self {
-        let farthest = shells.iter().map(|shell| shell.way).fold(0.0, f64::max);
+        let farthest = shells.iter().map(|shell| shell.max_displacement).fold(0.0, f64::max);
         let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
-        let bounds = shells.iter().map(|shell| &shell.bounds_of_ways);
-        let [least, greatest] =
-            bounds.fold(none, |[low, high], [least, greatest]| [low.inf(least), high.sup(greatest)]);
-        let middle = (least + greatest) * 0.5;
-        let beside = 0.5 * (greatest - least).norm();
-        if middle.norm() + beside > ALONG * farthest {
+        let bounds = shells.iter().map(|shell| &shell.displacement_bounds);
+        let [min, max] = bounds.fold(none, |[min, max], [low, high]| [min.inf(low), max.sup(high)]);
+        let middle = (min + max) * 0.5;
+        let beside = 0.5 * (max - min).norm();
+        if middle.norm() + beside > MAX_RATIO * farthest {
             return Self { along: [0.0; 3], beside: farthest / diameter };
         }
         Self { along: [0, 1, 2].map(|axis| (middle[axis] / diameter) as f32), beside: beside / diameter }
     }
 
     /// Upper bound of the displacement of a vertex (diameters).
-    pub fn most(&self) -> f64 {
+    pub fn max(&self) -> f64 {
         f64::from(norm(self.along)) + self.beside
     }
 }
 
-/// Maximum of [`Travel::most`], as a multiple of the largest displacement of a vertex: beyond it, grains that do not ride on a mesh would
+/// Maximum of [`Travel::max`], as a multiple of the largest displacement of a vertex: beyond it, grains that do not ride on a mesh would
 /// search too often.
-const ALONG: f64 = 1.2;
+const MAX_RATIO: f64 = 1.2;
 
 /// Maximum distance (diameters) from the middle of a block to a mesh that its members touch: they have left the block by less than two
 /// diameters.
-pub fn around() -> f64 {
+pub fn block_reach() -> f64 {
     0.5 * f64::from(EDGE) * 3f64.sqrt() + REACH + 2.0
 }
 
@@ -89,13 +89,14 @@ impl Search<'_> {
     /// infinite without meshes.
     ///
     /// Grains in a closing gap between an object and the base would be squeezed out like a liquid, faster without bound the shorter the
-    /// sub-steps; snow is compacted instead. Contacts dissipate energy: apart from falling, no grain becomes faster than whatever drives
-    /// them all.
+    /// sub-steps; snow is compacted instead. Contacts dissipate energy: apart from falling, no grain becomes faster than the fastest
+    /// mesh or grain that drives it.
     pub fn fastest(&self, fastest: f32, restitution: f32, gravity: f32) -> f32 {
-        let Some(way) = self.shells.iter().map(|shell| shell.way).reduce(f64::max) else {
+        let Some(displacement) = self.shells.iter().map(|shell| shell.max_displacement).reduce(f64::max)
+        else {
             return f32::INFINITY;
         };
-        let thrown = (way / self.dt) as f32 * (1.0 + restitution);
+        let thrown = (displacement / self.dt) as f32 * (1.0 + restitution);
         let falls = (gravity.abs() * self.diameter as f32).sqrt();
         fastest.max(thrown).max(falls) * (1.0 + ROUNDING)
     }
@@ -107,61 +108,62 @@ impl Search<'_> {
 
     /// Whether a mesh may be near members of a block, according to the block's limit.
     pub fn may_be_near(&self, block: &Block) -> bool {
-        !block.members.is_empty() && self.is_within(block.limit, around() + self.travel.most())
+        !block.members.is_empty() && self.is_within(block.limit, block_reach() + self.travel.max())
     }
 
     /// Touches of the members of a block with meshes. A resting grain has one only if a moving mesh touches it, which wakes it.
     /// Updates the limits of the block and of its grains.
     pub fn touches(&self, scratch: &mut Scratch, block: &mut Block, rows: Shared<'_, Row>) -> Vec<Touch> {
-        let most = self.travel.most();
+        let max = self.travel.max();
         // A block that touched a mesh in the last sub-step is still near it.
         if !block.touches.iter().any(Touch::is_of_mesh) {
             let middle = world(block.at, [EDGE * 0.5; 3], self.diameter);
-            block.limit = self.limit(middle, around() + f64::from(EDGE));
+            block.limit = self.limit(middle, block_reach() + f64::from(EDGE));
             if !self.may_be_near(block) {
                 return Vec::new();
             }
         }
-        let Scratch { asking, nearby } = scratch;
-        asking.clear();
-        let mut room = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
+        let Scratch { queries, nearby } = scratch;
+        queries.clear();
+        let mut bounds = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
         let mut farthest = 0.0f64;
         for &slot in &block.members {
             // SAFETY: a grain is a member of one block, which one task has.
             let row = unsafe { rows.get(slot as usize) };
             let reach = REACH + f64::from(norm(row.velocity)) * self.dt / self.diameter;
             let closing = if row.rests() {
-                most
+                max
             } else {
-                let way = scaled(row.velocity, (self.dt / self.diameter) as f32);
-                f64::from(norm(sub(way, self.travel.along))) + self.travel.beside
+                let displacement = scaled(row.velocity, (self.dt / self.diameter) as f32);
+                f64::from(norm(sub(displacement, self.travel.along))) + self.travel.beside
             };
-            if self.is_within(row.limit, REACH + closing) && !(row.rests() && most == 0.0) {
+            if self.is_within(row.limit, REACH + closing) && !(row.rests() && max == 0.0) {
                 let position = world(block.at, row.position, self.diameter);
-                room = [room[0].inf(&position), room[1].sup(&position)];
+                bounds = [bounds[0].inf(&position), bounds[1].sup(&position)];
                 // Near fast meshes, a grain would have to search again at once anyway.
-                let within = if most < 0.5 * AHEAD { reach + AHEAD } else { reach };
+                let within = if max < 0.5 * AHEAD { reach + AHEAD } else { reach };
                 farthest = farthest.max(within);
-                asking.push(Asking { slot, position, reach, within });
+                queries.push(Query { slot, position, reach, within });
             }
         }
-        if asking.is_empty() {
+        if queries.is_empty() {
             return Vec::new();
         }
         nearby.resize_with(self.shells.len(), Nearby::default);
         for (shell, nearby) in self.shells.iter().zip(&mut *nearby) {
-            nearby.find(shell, &room, farthest * self.diameter);
+            nearby.find(shell, &bounds, farthest * self.diameter);
         }
         let mut touches = Vec::new();
-        for asking in asking {
+        for query in queries {
             // SAFETY: as above.
-            let row = unsafe { rows.get(asking.slot as usize) };
-            self.touch(asking, nearby, row, &mut touches);
+            let row = unsafe { rows.get(query.slot as usize) };
+            self.touch(query, nearby, row, &mut touches);
         }
         touches
     }
 
-    /// Travel of the meshes at which one can reach a position (m), from a search within `within` diameters.
+    /// Travel of the meshes (diameters, from the start of the step) before one can reach a position (m), from a search within `within`
+    /// diameters.
     fn limit(&self, position: DVec3, within: f64) -> f32 {
         let square =
             |shell: &&Shell| shell.nearest(position, within * self.diameter).map(|found| found.square);
@@ -170,17 +172,17 @@ impl Search<'_> {
     }
 
     /// Finds what a grain touches, and updates its limit.
-    fn touch(&self, asking: &Asking, nearby: &mut [Nearby], row: &mut Row, touches: &mut Vec<Touch>) {
-        let Asking { slot, position, reach, within } = *asking;
+    fn touch(&self, query: &Query, nearby: &mut [Nearby], row: &mut Row, touches: &mut Vec<Touch>) {
+        let Query { slot, position, reach, within } = *query;
         let mut free = within;
         for (shell, nearby) in self.shells.iter().zip(nearby) {
             let Some(nearest) = nearby.nearest(shell, position, within * self.diameter) else { continue };
             let distance = nearest.square.sqrt() / self.diameter;
             free = free.min(distance);
-            if distance <= reach + nearest.motion.norm() / self.diameter {
+            if distance <= reach + nearest.displacement.norm() / self.diameter {
                 let touch = shell.touch(slot, row, position, &nearest, self.diameter, self.dt);
                 let is_close = dot(touch.normal, row.position) - touch.offset < rest::NEAR;
-                let moves = nearest.motion.norm() > 1.0e-6 * self.diameter;
+                let moves = nearest.displacement.norm() > 1.0e-6 * self.diameter;
                 if !row.rests() || is_close && moves {
                     rest::wake(row);
                     touches.push(touch);
@@ -206,12 +208,15 @@ mod tests {
     use super::*;
 
     /// A triangle with displacements of its corners (m).
-    fn moved(ways: [[f64; 3]; 3]) -> Shell {
+    fn moved(displacements: [[f64; 3]; 3]) -> Shell {
         let positions = [DVec3::zeros(), DVec3::x(), DVec3::z()];
         let mut shell = Shell::new(0.0, vec![[0, 1, 2]], false, positions.to_vec());
-        let next: Vec<DVec3> =
-            positions.iter().zip(ways).map(|(position, way)| position + DVec3::from(way)).collect();
-        shell.follow(&next);
+        let next: Vec<DVec3> = positions
+            .iter()
+            .zip(displacements)
+            .map(|(position, displacement)| position + DVec3::from(displacement))
+            .collect();
+        shell.advance(&next);
         shell
     }
 
@@ -220,15 +225,15 @@ mod tests {
         let [along, still] = [[0.3, -0.2, 0.1], [0.0; 3]];
         let cases =
             [[along; 3], [still; 3], [along, still, still], [[0.2, 0.0, 0.0], [-0.2, 0.0, 0.0], still]];
-        for ways in cases {
-            let shell = moved(ways);
+        for displacements in cases {
+            let shell = moved(displacements);
             let travel = Travel::of(&[&shell], 0.1);
             let corner = travel.along.map(f64::from);
-            for way in ways {
-                let rest = DVec3::from(way) / 0.1 - DVec3::from(corner);
-                assert!(rest.norm() <= travel.beside + 1.0e-6, "{travel:?} for {way:?}");
+            for displacement in displacements {
+                let rest = DVec3::from(displacement) / 0.1 - DVec3::from(corner);
+                assert!(rest.norm() <= travel.beside + 1.0e-6, "{travel:?} for {displacement:?}");
             }
-            assert!(travel.most() <= ALONG * shell.way / 0.1 + 1.0e-6, "{travel:?}");
+            assert!(travel.max() <= MAX_RATIO * shell.max_displacement / 0.1 + 1.0e-6, "{travel:?}");
         }
         assert!(Travel::of(&[&moved([along; 3])], 0.1).beside < 1.0e-6);
     }

@@ -1,4 +1,4 @@
-//! What grains collide with in a step.
+//! The colliders of a step.
 
 use super::field::Field;
 use super::shell::Shell;
@@ -16,7 +16,7 @@ pub struct Colliders<'a> {
     pub floor: Option<Floor>,
     /// A level set that does not move during the step.
     pub field: Option<Field<'a>>,
-    /// Meshes, each with its pose (m) at a share 0..=1 of the step, which ground ignores.
+    /// Meshes, each with a function for its pose (m) at a share 0..=1 of the step; ground ignores poses.
     pub shells: Vec<(Shell, Pose<'a>)>,
 }
 

@@ -12,8 +12,8 @@ use crate::geometry::DVec3;
 use crate::numeric::lanes::LANES;
 use crate::snow::grains::solver::rows::{Row, dot};
 
-/// Vertices that one task measures.
-const VERTICES: usize = 4096;
+/// Vertices whose displacements one task measures.
+const VERTICES_PER_TASK: usize = 4096;
 /// Triangles in a leaf of the tree: as many as are compared at once.
 const LEAF: usize = LANES;
 
@@ -29,34 +29,33 @@ pub struct Shell {
     triangles: Vec<[u32; 3]>,
     /// Whether it has an inside.
     closed: bool,
-    /// For ground, which has an inside and does not move: the sides and corners of each triangle that lie on the rim of a sheet
-    /// ([`RIM_CORNER`]).
+    /// For ground: the bits of the sides and corners of each triangle that lie on the rim of a sheet ([`RIM_CORNER`]).
     rims: Option<Vec<u8>>,
     now: Vec<DVec3>,
     next: Vec<DVec3>,
     /// Bounding boxes of a complete binary tree over leaves of triangles, root first.
     boxes: Vec<[DVec3; 2]>,
     /// Largest displacement of a vertex in the sub-step (m), for each box.
-    ways: Vec<f64>,
+    max_displacements: Vec<f64>,
     leaves: usize,
     /// Largest displacement of a vertex in the sub-step (m).
-    pub(super) way: f64,
+    pub(super) max_displacement: f64,
     /// Bounds of the displacements (m).
-    pub(super) bounds_of_ways: [DVec3; 2],
+    pub(super) displacement_bounds: [DVec3; 2],
 }
 
 /// Below this distance (m) from its nearest point, a position takes the triangle's normal as the outward direction.
-const LEAST: f64 = 1.0e-9;
+const MIN_DISTANCE: f64 = 1.0e-9;
 /// Search distance for the surface when a depth is queried (radii of the ball).
-pub const DEPTHS: f64 = 3.0;
+pub const DEPTH_REACH: f64 = 3.0;
 
 /// The point of the surface nearest to a position.
 pub struct Nearest {
     /// Square of its distance (m2).
     pub square: f64,
     point: DVec3,
-    /// Its displacement in the sub-step (m).
-    pub motion: DVec3,
+    /// Displacement of that point in the sub-step (m).
+    pub displacement: DVec3,
     /// Height of the position above the plane of its triangle.
     height: f64,
     normal: DVec3,
@@ -70,9 +69,9 @@ impl Shell {
         let leaves = triangles.len().div_ceil(LEAF).max(1).next_power_of_two();
         let next = pose.clone();
         let boxes = vec![[DVec3::zeros(); 2]; 2 * leaves - 1];
-        let ways = vec![0.0; 2 * leaves - 1];
-        let (now, stick, way, collider) = (pose, 0.0, 0.0, FIRST_SHELL);
-        let bounds_of_ways = [DVec3::zeros(); 2];
+        let max_displacements = vec![0.0; 2 * leaves - 1];
+        let (now, stick, max_displacement, collider) = (pose, 0.0, 0.0, FIRST_SHELL);
+        let displacement_bounds = [DVec3::zeros(); 2];
         let mut shell = Self {
             collider,
             friction,
@@ -83,10 +82,10 @@ impl Shell {
             now,
             next,
             boxes,
-            ways,
+            max_displacements,
             leaves,
-            way,
-            bounds_of_ways,
+            max_displacement,
+            displacement_bounds,
         };
         shell.sort();
         shell
@@ -95,19 +94,19 @@ impl Shell {
     /// A mesh that does not move, for distance queries.
     pub fn at_rest(triangles: Vec<[u32; 3]>, pose: Vec<DVec3>) -> Self {
         let mut shell = Self::new(0.0, triangles, false, pose.clone());
-        shell.follow(&pose);
+        shell.advance(&pose);
         shell
     }
 
     /// Ground: a mesh that does not move and whose inside no grain may enter, except beyond the rims of its sheets.
-    pub fn in_front(
+    pub fn ground(
         friction: f32,
         triangles: Vec<[u32; 3]>,
         rims: impl FnOnce(&[[u32; 3]]) -> Vec<u8>,
         pose: Vec<DVec3>,
     ) -> Self {
         let mut shell = Self::new(friction, triangles, true, pose.clone());
-        shell.follow(&pose);
+        shell.advance(&pose);
         shell.rims = Some(rims(&shell.triangles));
         shell
     }
@@ -154,7 +153,7 @@ impl Shell {
     }
 
     /// Advances to the next sub-step: the next pose becomes the current one, and `pose` the next. Ground is unchanged.
-    pub fn follow(&mut self, pose: &[DVec3]) {
+    pub fn advance(&mut self, pose: &[DVec3]) {
         if self.is_ground() {
             return;
         }
@@ -164,41 +163,42 @@ impl Shell {
         self.measure();
         let (now, triangles, leaves) = (&self.now, &self.triangles, self.leaves);
         let (inner, outer) = self.boxes.split_at_mut(leaves - 1);
-        let (next, (inner_ways, outer_ways)) = (&self.next, self.ways.split_at_mut(leaves - 1));
-        let outer_nodes = outer.par_iter_mut().zip(outer_ways.par_iter_mut());
-        outer_nodes.enumerate().with_min_len(256).for_each(|(leaf, (bounds, way))| {
-            (*bounds, *way) = (EMPTY, 0.0);
+        let (next, (inner_max, outer_max)) = (&self.next, self.max_displacements.split_at_mut(leaves - 1));
+        let outer_nodes = outer.par_iter_mut().zip(outer_max.par_iter_mut());
+        outer_nodes.enumerate().with_min_len(256).for_each(|(leaf, (bounds, max_displacement))| {
+            (*bounds, *max_displacement) = (EMPTY, 0.0);
             for triangle in triangles.iter().skip(leaf * LEAF).take(LEAF) {
                 for &index in triangle {
                     let position = now[index as usize];
                     *bounds = [bounds[0].inf(&position), bounds[1].sup(&position)];
-                    *way = way.max((next[index as usize] - position).norm());
+                    *max_displacement = max_displacement.max((next[index as usize] - position).norm());
                 }
             }
         });
         for node in (0..inner.len()).rev() {
             let child = |index: usize| match index.checked_sub(leaves - 1) {
-                Some(leaf) => (outer[leaf], outer_ways[leaf]),
-                None => (inner[index], inner_ways[index]),
+                Some(leaf) => (outer[leaf], outer_max[leaf]),
+                None => (inner[index], inner_max[index]),
             };
-            let ((a, way), (b, other)) = (child(2 * node + 1), child(2 * node + 2));
+            let ((a, max_displacement), (b, other)) = (child(2 * node + 1), child(2 * node + 2));
             inner[node] = [a[0].inf(&b[0]), a[1].sup(&b[1])];
-            inner_ways[node] = way.max(other);
+            inner_max[node] = max_displacement.max(other);
         }
     }
 
     /// Finds the largest displacement and the bounds of all displacements.
     fn measure(&mut self) {
-        let ways = self.now.par_iter().zip(&self.next).with_min_len(VERTICES).map(|(now, next)| next - now);
-        let with = |(square, [low, high]): (f64, [DVec3; 2]), way: DVec3| {
-            (f64::max(square, way.norm_squared()), [low.inf(&way), high.sup(&way)])
+        let displacements =
+            self.now.par_iter().zip(&self.next).with_min_len(VERTICES_PER_TASK).map(|(now, next)| next - now);
+        let with = |(square, [low, high]): (f64, [DVec3; 2]), displacement: DVec3| {
+            (f64::max(square, displacement.norm_squared()), [low.inf(&displacement), high.sup(&displacement)])
         };
         let both = |(square, [low, high]): (f64, [DVec3; 2]),
-                    (other, [least, greatest]): (f64, [DVec3; 2])| {
-            (f64::max(square, other), [low.inf(&least), high.sup(&greatest)])
+                    (other, [box_low, box_high]): (f64, [DVec3; 2])| {
+            (f64::max(square, other), [low.inf(&box_low), high.sup(&box_high)])
         };
-        let (square, bounds) = ways.fold(|| (0.0, EMPTY), with).reduce(|| (0.0, EMPTY), both);
-        (self.way, self.bounds_of_ways) = (square.sqrt(), bounds);
+        let (square, bounds) = displacements.fold(|| (0.0, EMPTY), with).reduce(|| (0.0, EMPTY), both);
+        (self.max_displacement, self.displacement_bounds) = (square.sqrt(), bounds);
     }
 
     /// The touch of the grain in a slot with the plane through a nearest point.
@@ -214,7 +214,7 @@ impl Shell {
         let (distance, inside, out) = self.side(position, nearest);
         let normal = [out.x as f32, out.y as f32, out.z as f32];
         let gap = (if inside { -distance } else { distance }) / diameter - 0.5;
-        let velocity = nearest.motion / dt;
+        let velocity = nearest.displacement / dt;
         Touch {
             grain: slot,
             collider: self.collider,
@@ -232,7 +232,7 @@ impl Shell {
     fn side(&self, position: DVec3, nearest: &Nearest) -> (f64, bool, DVec3) {
         let distance = nearest.square.sqrt();
         let inside = self.closed && nearest.height < 0.0 && !nearest.is_on_rim;
-        let out = if distance > LEAST {
+        let out = if distance > MIN_DISTANCE {
             (position - nearest.point) * (if inside { -1.0 } else { 1.0 } / distance)
         } else {
             nearest.normal
@@ -243,23 +243,18 @@ impl Shell {
     /// Distance (m) and direction in which a ball of a radius (m) must move to leave the mesh; none if it does not overlap
     /// the mesh or no surface lies within three radii. The mesh must be at rest.
     pub fn depth(&self, position: DVec3, radius: f64) -> Option<(f64, DVec3)> {
-        self.depth_beside(position, radius, self.nearest(position, DEPTHS * radius))
+        self.depth_from(position, radius, self.nearest(position, DEPTH_REACH * radius))
     }
 
-    /// The same if the nearest point within [`DEPTHS`] radii is known.
-    pub fn depth_beside(
-        &self,
-        position: DVec3,
-        radius: f64,
-        nearest: Option<Nearest>,
-    ) -> Option<(f64, DVec3)> {
+    /// The same, given the nearest point within [`DEPTH_REACH`] radii.
+    pub fn depth_from(&self, position: DVec3, radius: f64, nearest: Option<Nearest>) -> Option<(f64, DVec3)> {
         let nearest = nearest?;
         let (distance, inside, out) = self.side(position, &nearest);
         let depth = if inside { radius + distance } else { radius - distance };
         (depth > 0.0).then_some((depth, out))
     }
 
-    /// The nearest point of the surface within a distance (m) plus its displacement in the sub-step.
+    /// The nearest point of the surface within a distance (m) plus the displacement of the surface in the sub-step.
     pub fn nearest(&self, position: DVec3, within: f64) -> Option<Nearest> {
         let apart = |bounds: &[DVec3; 2]| {
             let outside = (bounds[0] - position).sup(&(position - bounds[1])).sup(&DVec3::zeros());
@@ -271,8 +266,8 @@ impl Shell {
         while depth > 0 {
             depth -= 1;
             let node = stack[depth];
-            let reach = (within + self.ways[node]).powi(2);
-            if apart(&self.boxes[node]) > best.most.min(reach) {
+            let reach = (within + self.max_displacements[node]).powi(2);
+            if apart(&self.boxes[node]) > best.max_square.min(reach) {
                 continue;
             }
             if node < self.leaves - 1 {
@@ -321,7 +316,7 @@ impl Shell {
             }
         };
         if is_better {
-            best.most = best.most.min(square * (1.0 + 1.0e-8));
+            best.max_square = best.max_square.min(square * (1.0 + 1.0e-8));
             best.found = Some(Found { square, triangle: index, weights, point, height });
         }
     }
@@ -339,16 +334,16 @@ impl Shell {
         while depth > 0 {
             depth -= 1;
             let node = stack[depth];
-            let room = within + self.ways[node];
-            let [least, greatest] = &self.boxes[node];
-            if (0..3).any(|axis| least[axis] - room > high[axis] || greatest[axis] + room < low[axis]) {
+            let margin = within + self.max_displacements[node];
+            let [box_low, box_high] = &self.boxes[node];
+            if (0..3).any(|axis| box_low[axis] - margin > high[axis] || box_high[axis] + margin < low[axis]) {
                 continue;
             }
             if node < self.leaves - 1 {
                 (stack[depth], stack[depth + 1]) = (2 * node + 2, 2 * node + 1);
                 depth += 2;
             } else {
-                visit((node - (self.leaves - 1)) as u32, &self.boxes[node], self.ways[node]);
+                visit((node - (self.leaves - 1)) as u32, &self.boxes[node], self.max_displacements[node]);
             }
         }
     }
@@ -374,13 +369,20 @@ impl Shell {
 
     pub(in crate::snow::grains) fn resolve(&self, found: Found, position: DVec3) -> Nearest {
         let Found { square, triangle, weights, point, .. } = found;
-        let way = |corner: usize| {
+        let displacement = |corner: usize| {
             let index = self.triangles[triangle][corner] as usize;
             (self.next[index] - self.now[index]) * weights[corner]
         };
         let (height, normal) = self.plane(triangle, position);
         let is_on_rim = self.rims.as_ref().is_some_and(|rims| is_on_rim(rims[triangle], weights));
-        Nearest { square, point, motion: way(0) + way(1) + way(2), height, normal, is_on_rim }
+        Nearest {
+            square,
+            point,
+            displacement: displacement(0) + displacement(1) + displacement(2),
+            height,
+            normal,
+            is_on_rim,
+        }
     }
 }
 
@@ -397,12 +399,12 @@ fn is_on_rim(rim: u8, weights: [f64; 3]) -> bool {
 pub(in crate::snow::grains) struct Best {
     pub(in crate::snow::grains) found: Option<Found>,
     /// Square of the distance (m2) beyond which no triangle can be better.
-    pub(in crate::snow::grains) most: f64,
+    pub(in crate::snow::grains) max_square: f64,
 }
 
 impl Default for Best {
     fn default() -> Self {
-        Self { found: None, most: f64::INFINITY }
+        Self { found: None, max_square: f64::INFINITY }
     }
 }
 

@@ -26,7 +26,7 @@ pub struct Touch {
     /// Impulse along the normal (m/s).
     pub impulse: f32,
     /// Tangential impulse (m/s).
-    pub across: V,
+    pub tangential: V,
     /// Speed at which the grain bounces in this sub-step (m/s).
     pub bounce: f32,
 }
@@ -34,7 +34,7 @@ pub struct Touch {
 impl Touch {
     /// Total impulse (m/s).
     pub fn total(&self) -> V {
-        add(scaled(self.normal, self.impulse), self.across)
+        add(scaled(self.normal, self.impulse), self.tangential)
     }
 
     /// Grain and collider, unique for each touch.
@@ -43,22 +43,22 @@ impl Touch {
     }
 
     /// Clears the impulses after a bounce: the next sub-step starts without any.
-    pub fn forget_bounce(&mut self) {
+    pub fn clear_bounce(&mut self) {
         if self.bounce > 0.0 {
-            (self.impulse, self.across, self.bounce) = (0.0, [0.0; 3], 0.0);
+            (self.impulse, self.tangential, self.bounce) = (0.0, [0.0; 3], 0.0);
         }
     }
 
     /// Continues with the impulses of the same touch in the last sub-step.
     pub fn take_over(&mut self, old: &Self) {
-        (self.impulse, self.across, self.bounce) = (old.impulse, old.across, old.bounce);
+        (self.impulse, self.tangential, self.bounce) = (old.impulse, old.tangential, old.bounce);
     }
 
     /// The part that the next step needs.
-    pub fn kept(mut self) -> Self {
-        self.forget_bounce();
-        let Self { grain, collider, impulse, across, .. } = self;
-        Self { grain, collider, impulse, across, ..Self::default() }
+    pub fn for_next_step(mut self) -> Self {
+        self.clear_bounce();
+        let Self { grain, collider, impulse, tangential, .. } = self;
+        Self { grain, collider, impulse, tangential, ..Self::default() }
     }
 
     /// Whether it has a plane: false if it was kept from the last step, or if the grain is deep in a level set.

@@ -15,7 +15,7 @@ pub const ALL_CELLS: usize = CELLS * CELLS * CELLS;
 pub const NONE: u32 = u32::MAX;
 
 /// Index of a block along each axis.
-pub type At = [i32; 3];
+pub type BlockIndex = [i32; 3];
 
 /// The block of a grain.
 #[derive(Clone, Copy)]
@@ -29,7 +29,7 @@ pub struct Home {
 /// A block of grains and their state in a step.
 pub struct Block {
     /// Its index.
-    pub at: At,
+    pub at: BlockIndex,
     /// The blocks around it, and itself in the middle, ordered by x, y, z; [`NONE`] where there is none.
     pub near: [u32; 27],
     /// Slots of its grains, sorted by cell, within a cell by identity.
@@ -53,7 +53,7 @@ pub struct Block {
     /// Whether its members or anchors changed in this sub-step.
     pub is_changed: bool,
     /// Whether they have changed since the start of the step.
-    pub is_stirred: bool,
+    pub has_ever_changed: bool,
     /// Whether its touches are out of date.
     pub lacks_touches: bool,
     /// Whether its touches are to be found again in this sub-step.
@@ -61,5 +61,5 @@ pub struct Block {
     /// Whether its pairs are out of date.
     pub lacks_pairs: bool,
     /// Whether its pairs were found in this step.
-    pub is_found: bool,
+    pub has_found_pairs: bool,
 }

@@ -9,29 +9,30 @@ use crate::numeric::lanes::{LaneMask, Lanes};
 /// Share of an overlap that a sub-step removes.
 const REMOVED: f32 = 0.8;
 /// Maximum correction of an overlap in a sub-step (diameters).
-pub const FARTHEST: f32 = 0.5;
+pub const MAX_CORRECTION: f32 = 0.5;
 /// Maximum gap (diameters) at which a contact still supports and keeps its impulse.
 pub const TOUCHING: f32 = 0.02;
-/// Gap (diameters) below which contacts are not closed, and overlap (`SLOP`) that they may keep. If every overlap were
-/// removed, a heap would never come to rest: each push opens and closes contacts around it.
+/// Gap (diameters) that counts as closed, and overlap (`SLOP`) that contacts may keep. If every overlap were removed, a heap
+/// would never come to rest: each push opens and closes contacts around it.
 const SLACK: f32 = 0.01;
 /// See [`SLACK`].
 const SLOP: f32 = 0.02;
 /// The same for grains that attract each other: a larger value would let walls crack.
 const SLOP_OF_WALLS: f32 = 0.005;
-/// An impulse changes the velocity of a supported grain directly above another supported one by this share more than equal masses would,
-/// and that of the lower one by this share less. Masses thus decrease upward by a factor e^(-2 x this) per diameter, and one upward sweep
-/// nearly finds the impulses of a deep bed. Equal masses never do: a bed creeps down slopes of a third of its angle of repose. Grains that
-/// attract each other have equal masses: their strength is a force, and with unequal masses walls of any height would stand.
+/// If a supported grain lies directly above another supported one, an impulse changes the velocity of the upper one by this share more
+/// than with equal masses, and that of the lower one by this share less. Masses thus decrease upward by a factor e^(-2 x this) per
+/// diameter, and one upward sweep nearly finds the impulses of a deep bed. Equal masses never do: a bed creeps down slopes of a third of
+/// its angle of repose. Grains that attract each other have equal masses: their strength is a force, and with unequal masses walls of any
+/// height would stand.
 const LIGHTER_ABOVE: f32 = 0.2;
 /// Minimum distance (diameters) between two grains that defines a direction.
-const LEAST: f32 = 1.0e-6;
+const MIN_DISTANCE: f32 = 1.0e-6;
 /// Minimum upward component of the direction from a grain to one that it supports.
-pub const STEEP: f32 = 0.2;
+pub const MIN_UPWARD: f32 = 0.2;
 
 /// Eight grains of a batch.
 #[derive(Clone, Copy)]
-pub struct Eight {
+pub struct EightGrains {
     position: V8,
     /// Inverse masses.
     pub weight: Lanes,
@@ -41,17 +42,17 @@ pub struct Eight {
     still: Lanes,
 }
 
-impl Eight {
+impl EightGrains {
     /// # Safety
     /// As for [`Shared::gather`].
     #[inline(always)]
     pub unsafe fn load(rows: Shared<'_, Row>, slots: &[u32; 8]) -> Self {
         // SAFETY: the caller's promise.
-        let ([x, y, z, hold], [u, v, w, still]) =
-            unsafe { (rows.gather(slots, Part::Place), rows.gather(slots, Part::Velocity)) };
-        let free = hold.is_less(Lanes::all(SUPPORTED));
-        let weight = free.choose(hold, hold - Lanes::all(SUPPORTED));
-        let supported = Lanes::all(1.5).is_less(hold);
+        let ([x, y, z, mass_state], [u, v, w, still]) =
+            unsafe { (rows.gather(slots, Part::Position), rows.gather(slots, Part::Velocity)) };
+        let free = mass_state.is_less(Lanes::all(SUPPORTED));
+        let weight = free.choose(mass_state, mass_state - Lanes::all(SUPPORTED));
+        let supported = Lanes::all(1.5).is_less(mass_state);
         Self { position: [x, y, z], weight, supported, velocity: [u, v, w], still }
     }
 
@@ -91,16 +92,16 @@ pub struct Contact {
 impl Contact {
     /// The contacts of a batch.
     #[inline(always)]
-    pub fn between(a: &Eight, b: &Eight, batch: &Batch, c: &Coefficients) -> Self {
+    pub fn between(a: &EightGrains, b: &EightGrains, batch: &Batch, c: &Coefficients) -> Self {
         let (zero, one) = (Lanes::all(0.0), Lanes::all(1.0));
         let weights = a.weight + b.weight;
         // 1 / weights, exact for 1 and 2.
         let inverse = Lanes::all(1.5) - Lanes::all(0.5) * weights;
         let apart = sub(sub(a.position, batch.shift()), b.position);
         let distance = dot(apart, apart).sqrt();
-        let [x, y, z] = scaled(apart, one / distance.max(Lanes::all(LEAST)));
+        let [x, y, z] = scaled(apart, one / distance.max(Lanes::all(MIN_DISTANCE)));
         // Two grains at the same position separate vertically.
-        let is_none = distance.is_less(Lanes::all(LEAST));
+        let is_none = distance.is_less(Lanes::all(MIN_DISTANCE));
         let normal = [is_none.choose(zero, x), is_none.choose(one, y), is_none.choose(zero, z)];
         let upward = dot(normal, c.up.map(Lanes::all));
         let lighter = Lanes::all(if c.attraction > 0.0 { 0.0 } else { LIGHTER_ABOVE });
@@ -113,7 +114,7 @@ impl Contact {
 
     /// Applies opposite impulses to both grains of each pair.
     #[inline(always)]
-    pub fn kick(&self, a: Eight, b: Eight, impulse: V8) -> (Eight, Eight) {
+    pub fn kick(&self, a: EightGrains, b: EightGrains, impulse: V8) -> (EightGrains, EightGrains) {
         let [up, down] = self.shares;
         (a.kicked(impulse, up), b.kicked(impulse, down))
     }
@@ -121,32 +122,37 @@ impl Contact {
 
 /// One correction of the velocities and impulses of eight pairs.
 #[inline(always)]
-pub fn collide(a: Eight, b: Eight, batch: &mut Batch, c: &Coefficients) -> (Eight, Eight, Contact) {
+pub fn collide(
+    a: EightGrains,
+    b: EightGrains,
+    batch: &mut Batch,
+    c: &Coefficients,
+) -> (EightGrains, EightGrains, Contact) {
     let (zero, one) = (Lanes::all(0.0), Lanes::all(1.0));
     let contact = Contact::between(&a, &b, batch, c);
     let Contact { normal, gap, weights, inverse, .. } = contact;
     let relative = sub(a.velocity, b.velocity);
     let along = dot(relative, normal);
     let closing = |gap: Lanes| zero - gap.max(zero) * Lanes::all(c.diameter / c.dt);
-    let (least, wanted) = if c.attraction > 0.0 {
+    let (min_impulse, wanted) = if c.attraction > 0.0 {
         let attracts = gap.is_less(Lanes::all(c.band));
-        let least = attracts.choose(Lanes::all(-c.attraction), zero);
-        (least, attracts.choose(zero, closing(gap)))
+        let min_impulse = attracts.choose(Lanes::all(-c.attraction), zero);
+        (min_impulse, attracts.choose(zero, closing(gap)))
     } else {
         (zero, closing(gap - Lanes::all(SLACK)))
     };
     let before = batch.impulse;
     let before_along = dot(before, normal);
-    let total = (before_along + (wanted - along) * inverse).max(least);
+    let total = (before_along + (wanted - along) * inverse).max(min_impulse);
     let sliding = sub(relative, scaled(normal, along));
-    let across = sub(sub(before, scaled(normal, before_along)), scaled(sliding, inverse));
+    let tangential = sub(sub(before, scaled(normal, before_along)), scaled(sliding, inverse));
     let slides = Lanes::all(c.slides).is_less(dot(sliding, sliding));
     let friction = slides.choose(Lanes::all(c.friction_of_sliding), Lanes::all(c.friction));
-    let most = friction * (total - least);
-    let square = dot(across, across);
-    let exceeds = (most * most).is_less(square);
-    let share = exceeds.choose(most / square.sqrt().max(Lanes::all(1.0e-30)), one);
-    let impulse = add(scaled(normal, total), scaled(across, share));
+    let max_friction = friction * (total - min_impulse);
+    let square = dot(tangential, tangential);
+    let exceeds = (max_friction * max_friction).is_less(square);
+    let share = exceeds.choose(max_friction / square.sqrt().max(Lanes::all(1.0e-30)), one);
+    let impulse = add(scaled(normal, total), scaled(tangential, share));
     let moves = zero.is_less(weights);
     for (axis, impulse) in impulse.into_iter().enumerate() {
         batch.impulse[axis] = moves.choose(impulse, before[axis]);
@@ -161,12 +167,12 @@ impl Contact {
     #[inline(always)]
     pub fn bounce(
         &self,
-        a: Eight,
-        b: Eight,
+        a: EightGrains,
+        b: EightGrains,
         is_held: LaneMask,
         impulse: &V8,
         c: &Coefficients,
-    ) -> (Eight, Eight) {
+    ) -> (EightGrains, EightGrains) {
         let zero = Lanes::all(0.0);
         let stopped = dot(*impulse, self.normal) * self.weights;
         let closing = self.gap.max(zero) * Lanes::all(c.diameter / c.dt);
@@ -179,7 +185,13 @@ impl Contact {
 
     /// Pushes of eight pairs, and marks for grains that are supported or woken.
     #[inline(always)]
-    pub fn push(&self, a: &Eight, b: &Eight, pushes: [[Lanes; 4]; 2], c: &Coefficients) -> [[Lanes; 4]; 2] {
+    pub fn push(
+        &self,
+        a: &EightGrains,
+        b: &EightGrains,
+        pushes: [[Lanes; 4]; 2],
+        c: &Coefficients,
+    ) -> [[Lanes; 4]; 2] {
         let (zero, one) = (Lanes::all(0.0), Lanes::all(1.0));
         let upward = self.upward;
         let moves = zero.is_less(self.weights);
@@ -188,7 +200,7 @@ impl Contact {
         // Overlap is removed; a gap must not close.
         let overlap = zero - self.gap;
         let slop = Lanes::all(if c.attraction > 0.0 { SLOP_OF_WALLS } else { SLOP });
-        let some = ((overlap - slop).max(zero) * Lanes::all(REMOVED)).min(Lanes::all(FARTHEST));
+        let some = ((overlap - slop).max(zero) * Lanes::all(REMOVED)).min(Lanes::all(MAX_CORRECTION));
         let removed = zero.is_less(self.gap).choose(overlap, some);
         let missing = removed - dot(sub(a_push, b_push), self.normal);
         let is_up = zero.is_less(upward);
@@ -205,7 +217,7 @@ impl Contact {
         let a_stands = a_wakes.choose(a_marks - woken, a_marks);
         let b_stands = b_wakes.choose(b_marks - woken, b_marks);
         let touching = self.gap.is_less(Lanes::all(TOUCHING));
-        let steep = if c.attraction > 0.0 { -2.0 } else { STEEP };
+        let steep = if c.attraction > 0.0 { -2.0 } else { MIN_UPWARD };
         let up = touching & Lanes::all(steep).is_less(upward) & (half.is_less(b_stands) | b_rests);
         let down = touching & upward.is_less(Lanes::all(-steep)) & (half.is_less(a_stands) | a_rests);
         let (a_stands, b_stands) = (up.choose(one, a_stands), down.choose(one, b_stands));
@@ -275,7 +287,7 @@ mod tests {
             let position = DVec3::new(0.5, 0.5 + f64::from(id), 0.5) * heap.diameter;
             heap.add(id, position, [0.0, speed, 0.0]).unwrap();
         }
-        heap.rows.iter_mut().for_each(|row| row.hold = 1.0 + SUPPORTED);
+        heap.rows.iter_mut().for_each(|row| row.mass_state = 1.0 + SUPPORTED);
         let division = Division { dt: 1.0e-3, sub_steps: 1 };
         let coefficients = params.coefficients(&division);
         let coefficients = Coefficients { up: [0.0, 1.0, 0.0], air: 0.0, attraction, ..coefficients };

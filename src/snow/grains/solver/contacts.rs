@@ -10,14 +10,14 @@ use rayon::prelude::*;
 
 use super::blocks::{ALL_CELLS, Block, CELLS, EDGE, Home, NONE};
 use super::layout::Layout;
-use super::pairs::{Batch, Held, INDEX, other};
+use super::pairs::{Batch, PairImpulse, SLOT_BITS, slot_of};
 use super::rows::{Row, V, norm, sub};
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::{LANES, Lanes};
 use crate::numeric::lists::reset;
 
 /// Maximum number of grains.
-pub const MOST: usize = 1 << INDEX;
+pub const MAX_GRAINS: usize = 1 << SLOT_BITS;
 
 /// A pair that was found.
 #[derive(Clone, Copy)]
@@ -36,23 +36,24 @@ struct Scratch {
     /// Pairs by owner.
     pairs: Vec<Pair>,
     /// For each grain around, the index after the last batch that contains it.
-    behind: Vec<u32>,
+    first_allowed: Vec<u32>,
     /// Count of pairs in each batch.
     counts: Vec<u8>,
-    /// For each batch itself if it is not full, else a later one to try.
-    room: Vec<u32>,
+    /// For each batch its own index if it is not full, else that of a later batch to try.
+    next_free: Vec<u32>,
 }
 
 /// The upper bits of a code: a step of -1 to 1 along each axis.
 fn step_bits(step: [i32; 3]) -> u32 {
     let [x, y, z] = step.map(|step| (step + 1) as u32);
-    (z << 4 | y << 2 | x) << INDEX
+    (z << 4 | y << 2 | x) << SLOT_BITS
 }
 
 impl Layout {
     /// Keeps the impulses of the last step until their pairs are found.
-    pub fn keep_held(&mut self, held: Vec<Held>) {
-        let mut kept: Vec<(u32, Held)> = held.into_par_iter().filter_map(|held| self.owned(held)).collect();
+    pub fn keep_impulses(&mut self, held: Vec<PairImpulse>) {
+        let mut kept: Vec<(u32, PairImpulse)> =
+            held.into_par_iter().filter_map(|held| self.with_owner(held)).collect();
         kept.par_sort_unstable_by_key(|(block, held)| (*block, held.grains));
         self.kept = kept;
     }
@@ -74,7 +75,7 @@ impl Layout {
             return;
         }
         let moved = self.moved(&is_listed);
-        fn of_block(all: &[(u32, Held)], block: u32) -> impl Iterator<Item = Held> {
+        fn of_block(all: &[(u32, PairImpulse)], block: u32) -> impl Iterator<Item = PairImpulse> {
             let first = all.partition_point(|(of, _)| *of < block);
             all[first..].iter().take_while(move |(of, _)| *of == block).map(|(_, held)| *held)
         }
@@ -89,14 +90,14 @@ impl Layout {
                         && scratch.carry(homes[1].rank, a, [-impulse[0], -impulse[1], -impulse[2]]);
             };
             for batch in &*batches {
-                batch.for_each_held(|grains, code, impulse| {
+                batch.for_each_impulse(|grains, code, impulse| {
                     let homes = [homes[grains[0] as usize], homes[grains[1] as usize]];
-                    if !has_moved || block.has(homes, code, index) {
+                    if !has_moved || block.still_owns(homes, code, index) {
                         carry(grains, homes, impulse);
                     }
                 });
             }
-            let kept = if block.is_found { &[] } else { &kept[..] };
+            let kept = if block.has_found_pairs { &[] } else { &kept[..] };
             for held in of_block(kept, index as u32).chain(of_block(&moved, index as u32)) {
                 let homes = held.grains.map(|grain| homes[grain as usize]);
                 if homes[0].block == index as u32 {
@@ -107,13 +108,13 @@ impl Layout {
         });
         self.blocks.par_iter_mut().zip(is_listed).filter(|(_, is_listed)| *is_listed).for_each(
             |(block, _)| {
-                (block.lacks_pairs, block.is_found) = (false, true);
+                (block.lacks_pairs, block.has_found_pairs) = (false, true);
             },
         );
     }
 
     /// The block that owns a pair, and the impulse with its grain first; none if a grain has left.
-    fn owned(&self, held: Held) -> Option<(u32, Held)> {
+    fn with_owner(&self, held: PairImpulse) -> Option<(u32, PairImpulse)> {
         let level = |block: u32| {
             let [x, y, z] = self.blocks[block as usize].at;
             [y, x, z]
@@ -124,12 +125,12 @@ impl Layout {
         } else if a == b || level(a) > level(b) {
             Some((a, held))
         } else {
-            Some((b, held.turned()))
+            Some((b, held.swapped()))
         }
     }
 
     /// Impulses of the pairs whose grains have just changed blocks, sorted by the block that owns them now.
-    fn moved(&self, is_listed: &[bool]) -> Vec<(u32, Held)> {
+    fn moved(&self, is_listed: &[bool]) -> Vec<(u32, PairImpulse)> {
         if !self.has_moved {
             return Vec::new();
         }
@@ -137,16 +138,16 @@ impl Layout {
         let moved = listed.flat_map_iter(|(index, batches)| {
             let mut gone = Vec::new();
             for batch in batches {
-                batch.for_each_held(|grains, code, impulse| {
+                batch.for_each_impulse(|grains, code, impulse| {
                     let homes = [self.homes[grains[0] as usize], self.homes[grains[1] as usize]];
-                    if !self.blocks[index].has(homes, code, index) {
-                        gone.extend(self.owned(Held { grains, impulse }));
+                    if !self.blocks[index].still_owns(homes, code, index) {
+                        gone.extend(self.with_owner(PairImpulse { grains, impulse }));
                     }
                 });
             }
             gone
         });
-        let mut moved: Vec<(u32, Held)> = moved.collect();
+        let mut moved: Vec<(u32, PairImpulse)> = moved.collect();
         moved.par_sort_unstable_by_key(|(block, held)| (*block, held.grains));
         moved
     }
@@ -165,15 +166,15 @@ impl Layout {
 
     /// The impulses of all pairs, sorted by slots: the same whether a pair was found in this step or kept. Pairs are freed block by block,
     /// so that both need not be in memory at once.
-    pub fn take_held(&mut self) -> Vec<Held> {
+    pub fn take_impulses(&mut self) -> Vec<PairImpulse> {
         let batches = std::mem::take(&mut self.batches);
         let kept = std::mem::take(&mut self.kept);
         let found = batches
             .into_par_iter()
             .flat_map_iter(|batches| batches.iter().flat_map(Batch::held).collect::<Vec<_>>());
-        let is_kept = |(block, _): &(u32, Held)| !self.blocks[*block as usize].is_found;
+        let is_kept = |(block, _): &(u32, PairImpulse)| !self.blocks[*block as usize].has_found_pairs;
         let all = found.chain(kept.into_par_iter().filter(is_kept).map(|(_, held)| held));
-        let mut held: Vec<Held> = all.map(Held::in_order).collect();
+        let mut held: Vec<PairImpulse> = all.map(PairImpulse::in_order).collect();
         held.par_sort_unstable_by_key(|held| held.grains);
         held
     }
@@ -221,7 +222,7 @@ const EARLIER: [usize; 13] = [0, 1, 2, 9, 10, 11, 18, 19, 20, 3, 4, 5, 12];
 impl Block {
     /// Whether a pair that the block owned is still its own: neither grain has changed blocks.
     #[inline(always)]
-    fn has(&self, homes: [Home; 2], code: usize, index: usize) -> bool {
+    fn still_owns(&self, homes: [Home; 2], code: usize, index: usize) -> bool {
         homes[0].block == index as u32 && homes[1].block == self.near[code]
     }
 
@@ -267,7 +268,7 @@ fn find_in(scratch: &mut Scratch, blocks: &[Block], index: usize) {
     scratch.starts.clear();
     scratch.starts.push(0);
     scratch.pairs.clear();
-    reset(&mut scratch.behind, total as usize, 0);
+    reset(&mut scratch.first_allowed, total as usize, 0);
     let mut runs: Vec<Run<'_>> = Vec::with_capacity(16);
     for cell in 0..ALL_CELLS {
         let own = block.starts[cell]..block.starts[cell + 1];
@@ -350,7 +351,7 @@ impl Scratch {
     fn carry(&mut self, owner: u32, partner: u32, impulse: V) -> bool {
         let owned = self.starts[owner as usize] as usize..self.starts[owner as usize + 1] as usize;
         for pair in &mut self.pairs[owned] {
-            if other(pair.code) == partner {
+            if slot_of(pair.code) == partner {
                 pair.impulse = impulse;
                 return true;
             }
@@ -360,23 +361,23 @@ impl Scratch {
 
     /// Puts each pair into the first batch that is not full after those of its grains' earlier pairs.
     fn schedule(&mut self, members: &[u32], batches: &mut Vec<Batch>) {
-        let Self { starts, pairs, behind, counts, room } = self;
+        let Self { starts, pairs, first_allowed, counts, next_free } = self;
         counts.clear();
-        room.clear();
+        next_free.clear();
         batches.clear();
         for (member, &slot) in members.iter().enumerate() {
             for pair in &pairs[starts[member] as usize..starts[member + 1] as usize] {
-                let least = behind[member].max(behind[pair.local as usize]) as usize;
-                let mut at = least;
-                while at < room.len() && room[at] as usize != at {
-                    at = room[at] as usize;
+                let first = first_allowed[member].max(first_allowed[pair.local as usize]) as usize;
+                let mut at = first;
+                while at < next_free.len() && next_free[at] as usize != at {
+                    at = next_free[at] as usize;
                 }
-                let mut through = least;
+                let mut through = first;
                 while through < at {
-                    through = std::mem::replace(&mut room[through], at as u32) as usize;
+                    through = std::mem::replace(&mut next_free[through], at as u32) as usize;
                 }
                 if at == batches.len() {
-                    room.push(at as u32);
+                    next_free.push(at as u32);
                     counts.push(0);
                     // All lanes: unused ones repeat the first pair.
                     let (owners, codes) = ([slot; LANES], [pair.code; LANES]);
@@ -387,10 +388,10 @@ impl Scratch {
                 (0..3).for_each(|axis| batch.impulse[axis].0[lane] = pair.impulse[axis]);
                 counts[at] += 1;
                 if counts[at] == LANES as u8 {
-                    room[at] = at as u32 + 1;
+                    next_free[at] = at as u32 + 1;
                 }
-                behind[member] = at as u32 + 1;
-                behind[pair.local as usize] = at as u32 + 1;
+                first_allowed[member] = at as u32 + 1;
+                first_allowed[pair.local as usize] = at as u32 + 1;
             }
         }
         if batches.capacity() > batches.len() + batches.len() / 4 + 4 {

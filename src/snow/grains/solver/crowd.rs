@@ -1,8 +1,8 @@
 //! Relieves crowding at the end of a step. An object fills the volume that it sweeps, so the snow of a slice as thick as its
 //! displacement must leave through a closing gap. Grains that push each other aside get no farther than about ten diameters
-//! in a frame; the others would end up inside one another, more of them with every frame. At the end of the step, surplus
-//! grains are therefore moved along the surfaces and through the grains around them, by the shortest path, to cells with free
-//! space: up the front of a plough, out from under a sole.
+//! in a frame; the rest would overlap more with every frame. At the end of the step, surplus grains are therefore moved along
+//! the surfaces and through the grains around them, by the shortest path, to cells with free space: up the front of a plough,
+//! out from under a sole.
 //!
 //! Grains are counted in cells of two diameters. They keep their velocity.
 
@@ -21,7 +21,7 @@ use crate::error::Result;
 use crate::geometry::DVec3;
 use crate::snow::grains::colliders::set::Colliders;
 use crate::snow::grains::heap::Heap;
-use crate::snow::grains::solver::blocks::{At, EDGE};
+use crate::snow::grains::solver::blocks::{BlockIndex, EDGE};
 
 /// Edge of a cell (diameters): it holds 2 x 2 x 2 grains side by side.
 const CELL: f32 = 2.0;
@@ -29,20 +29,20 @@ const CELL: f32 = 2.0;
 const PER_BLOCK: i32 = (EDGE / CELL) as i32;
 
 /// Grains that a crowded cell keeps in addition to one for each octant that is clear of surfaces.
-const KEPT: usize = 2;
+const EXTRA_KEPT: usize = 2;
 /// A cell with fewer grains than this has free space.
-const LOOSE: usize = 7;
+const FREE_BELOW: usize = 7;
 /// Maximum length of a grain's path (cells).
-const FARTHEST: usize = 100;
+const MAX_PATH: usize = 100;
 /// Minimum distance (diameters) from a surface at which a moved grain is placed.
-const CLEAR: f64 = 0.5;
+const CLEARANCE: f64 = 0.5;
 /// Largest offset (diameters) of a moved grain from the centre of its octant, along each axis.
 const JITTER: f32 = 0.25;
 /// Largest distance (diameters) of such a position from the centre of its cell.
-const CORNER: f64 = 1.3;
+const MAX_OFF_CENTRE: f64 = 1.3;
 /// A path does not enter cells whose centre is at least this deep (diameters) in a surface: half a cell edge, so that paths
 /// can run between two surfaces that touch.
-const DEEPEST: f64 = 1.0;
+const MAX_DEPTH: f64 = 1.0;
 /// Margin around a block (cells of a level set).
 const MARGIN: f64 = 2.0;
 
@@ -54,7 +54,7 @@ type Counts = [u32; CELLS];
 const CHUNK: usize = 16_384;
 
 impl Heap {
-    /// Moves grains out of cells that hold more than `most` into cells with free space. Meshes are at their current pose.
+    /// Moves grains out of cells that hold more than `max` into cells with free space. Meshes are at their current pose.
     ///
     /// # Errors
     /// Cancel; errors of a grid.
@@ -62,9 +62,9 @@ impl Heap {
         &mut self,
         ctx: &Context,
         colliders: &Colliders<'_>,
-        most: usize,
+        max: usize,
     ) -> Result<()> {
-        let crowded = self.crowded(most);
+        let crowded = self.crowded(max);
         if crowded.is_empty() {
             return Ok(());
         }
@@ -74,15 +74,15 @@ impl Heap {
         slots.par_sort_unstable();
         let mut map =
             Map { slots, rows: &self.rows, colliders, diameter: self.diameter, blocks: HashMap::new() };
-        let moves = Flow::begin(&mut map, &crowded)?.run(ctx, &mut map)?;
+        let moves = CrowdSearch::start_all(&mut map, &crowded)?.run(ctx, &mut map)?;
         for Move { slot, cell, position } in &moves {
             let row = &mut self.rows[*slot as usize];
             (row.position, self.at[*slot as usize]) = (*position, block(*cell));
             rest::wake(row);
-            rest::begin_again(row);
+            rest::restart_wait(row);
         }
         let slots: HashSet<u32> = moves.iter().map(|Move { slot, .. }| *slot).collect();
-        self.held.retain(|held| !held.grains.iter().any(|slot| slots.contains(slot)));
+        self.pair_impulses.retain(|held| !held.grains.iter().any(|slot| slots.contains(slot)));
         self.touches.retain(|touch| !slots.contains(&touch.grain));
         let ids: HashSet<u32> = slots.iter().map(|slot| self.ids[*slot as usize]).collect();
         self.trapped.retain(|id| !ids.contains(id));
@@ -91,11 +91,11 @@ impl Heap {
 }
 
 impl Heap {
-    /// Cells that hold more than `most` grains, ascending.
-    fn crowded(&self, most: usize) -> Vec<Cell> {
+    /// Cells that hold more than `max` grains, ascending.
+    fn crowded(&self, max: usize) -> Vec<Cell> {
         let chunks = self.rows.par_chunks(CHUNK).zip(self.at.par_chunks(CHUNK));
         let counts = chunks.map(|(rows, at)| {
-            let mut counts = HashMap::<At, Counts>::new();
+            let mut counts = HashMap::<BlockIndex, Counts>::new();
             // Grains of a block lie next to each other.
             let mut first = 0;
             for at in at.chunk_by(|a, b| a == b) {
@@ -112,7 +112,7 @@ impl Heap {
             }
             all
         });
-        let is_crowded = |(_, count): &(usize, &u32)| **count as usize > most;
+        let is_crowded = |(_, count): &(usize, &u32)| **count as usize > max;
         let cells = all.iter().flat_map(|(at, counts)| {
             counts.iter().enumerate().filter(is_crowded).map(|(index, _)| cell_of(*at, index))
         });
@@ -139,24 +139,23 @@ struct Map<'a, 'b> {
     /// Diameter of a grain (m).
     diameter: f64,
     /// Surfaces around the blocks visited so far.
-    blocks: HashMap<At, Surfaces<'a>>,
+    blocks: HashMap<BlockIndex, Surfaces<'a>>,
 }
 
 /// Contents of a cell.
-struct Known {
+struct CellContents {
     /// Side of the surfaces that its centre is on.
     side: Side,
     /// Count of grains in it.
     count: usize,
-    /// A position (diameters, within the block) in each octant that is clear of surfaces, and whether the octant holds
-    /// grains.
-    eighths: Vec<(V, bool)>,
+    /// For each octant that is clear of surfaces, a position in it (diameters, within the block) and whether it holds grains.
+    octants: Vec<(V, bool)>,
 }
 
 impl Map<'_, '_> {
     /// Reads the surfaces around cells.
-    fn see(&mut self, cells: impl Iterator<Item = Cell>) -> Result<()> {
-        let mut new: Vec<At> = cells.map(block).filter(|at| !self.blocks.contains_key(at)).collect();
+    fn load_surfaces(&mut self, cells: impl Iterator<Item = Cell>) -> Result<()> {
+        let mut new: Vec<BlockIndex> = cells.map(block).filter(|at| !self.blocks.contains_key(at)).collect();
         new.sort_unstable();
         new.dedup();
         let around = Surfaces::around(self.colliders, &new, self.diameter, MARGIN)?;
@@ -176,8 +175,8 @@ impl Map<'_, '_> {
         self.blocks[&at].side(world(at, position, self.diameter))
     }
 
-    /// Slots of the grains of a cell: those on the side of its centre, and those that a mesh separates from it.
-    fn on_two_sides(&self, cell: Cell, centre: &Side) -> [Vec<u32>; 2] {
+    /// Slots of the grains of a cell: those on the same side of meshes as its centre, and the others.
+    fn by_side(&self, cell: Cell, centre: &Side) -> [Vec<u32>; 2] {
         let is_beyond = |slot: &u32| {
             !centre.out.is_empty() && self.side_of(cell, self.rows[*slot as usize].position).is_across(centre)
         };
@@ -185,40 +184,40 @@ impl Map<'_, '_> {
         [here, beyond]
     }
 
-    /// Contents of a cell whose surroundings have been read. Octants are listed only if the cell has free space or `asks` is
+    /// Contents of a cell whose surfaces have been read. Octants are listed only if the cell has free space or `always` is
     /// set.
-    fn know(&self, cell: Cell, asks: bool) -> Known {
+    fn contents(&self, cell: Cell, always: bool) -> CellContents {
         let side = |position: V| self.side_of(cell, position);
         let corner = cell.map(|at| at.rem_euclid(PER_BLOCK) as f32 * CELL);
         let known = side(add(corner, [0.5 * CELL; 3]));
         let grains: Vec<u32> = self.grains(cell).collect();
         let count = grains.len();
-        let mut eighths = Vec::new();
-        if known.distance > -DEEPEST && (asks || count < LOOSE) {
-            let is_in = |slot: &u32, eighth: usize| {
+        let mut octants = Vec::new();
+        if known.distance > -MAX_DEPTH && (always || count < FREE_BELOW) {
+            let is_in = |slot: &u32, octant: usize| {
                 let position = self.rows[*slot as usize].position;
-                (0..3).all(|axis| (position[axis] - corner[axis] >= 0.5 * CELL) == (eighth >> axis & 1 == 1))
+                (0..3).all(|axis| (position[axis] - corner[axis] >= 0.5 * CELL) == (octant >> axis & 1 == 1))
             };
-            for eighth in 0..8 {
-                let position = add(corner, scattered(cell, eighth));
+            for octant in 0..8 {
+                let position = add(corner, jittered_position(cell, octant));
                 let is_clear = || {
                     let beside = side(position);
-                    beside.distance >= CLEAR && !beside.is_across(&known)
+                    beside.distance >= CLEARANCE && !beside.is_across(&known)
                 };
-                if known.distance >= CLEAR + CORNER || is_clear() {
-                    eighths.push((position, grains.iter().any(|slot| is_in(slot, eighth))));
+                if known.distance >= CLEARANCE + MAX_OFF_CENTRE || is_clear() {
+                    octants.push((position, grains.iter().any(|slot| is_in(slot, octant))));
                 }
             }
         }
-        Known { side: known, count, eighths }
+        CellContents { side: known, count, octants }
     }
 }
 
-/// Grains that leave crowded cells: a breadth-first search from all crowds at once. A crowd has one side of each mesh: grains
-/// of one cell on two sides of a sheet are two crowds, and crowds on two sides never share a cell.
-struct Flow {
+/// A breadth-first search from all crowds at once for cells with free space. A crowd lies on one side of each mesh: grains of
+/// one cell on two sides of a sheet are two crowds, and crowds on two sides never share a cell.
+struct CrowdSearch {
     /// The crowd that reached each cell first, and the index of the cell's side.
-    came: HashMap<Cell, (u32, usize)>,
+    reached_by: HashMap<Cell, (u32, usize)>,
     /// Sides of the cells and grains that paths start from.
     sides: Vec<Side>,
     /// Union-find: the crowd that each crowd was merged into, or itself.
@@ -229,29 +228,29 @@ struct Flow {
     front: Vec<(Cell, u32, usize)>,
 }
 
-impl Flow {
+impl CrowdSearch {
     /// One crowd per crowded cell, and another of the grains that a mesh separates from the cell's centre.
-    fn begin(map: &mut Map<'_, '_>, crowded: &[Cell]) -> Result<Self> {
-        map.see(crowded.iter().copied())?;
-        let known: Vec<(Known, [Vec<u32>; 2])> = crowded
+    fn start_all(map: &mut Map<'_, '_>, crowded: &[Cell]) -> Result<Self> {
+        map.load_surfaces(crowded.iter().copied())?;
+        let known: Vec<(CellContents, [Vec<u32>; 2])> = crowded
             .par_iter()
             .map(|&cell| {
-                let known = map.know(cell, true);
-                let grains = map.on_two_sides(cell, &known.side);
+                let known = map.contents(cell, true);
+                let grains = map.by_side(cell, &known.side);
                 (known, grains)
             })
             .collect();
-        let (came, sides, parents) = Default::default();
-        let mut flow = Self { came, sides, parents, pools: Vec::new(), front: Vec::new() };
+        let (reached_by, sides, parents) = Default::default();
+        let mut search = Self { reached_by, sides, parents, pools: Vec::new(), front: Vec::new() };
         for (&cell, (known, [here, beyond])) in crowded.iter().zip(known) {
-            let crowd = flow.start(cell, known.side, here.get(known.eighths.len() + KEPT..));
-            flow.came.insert(cell, crowd);
+            let crowd = search.start(cell, known.side, here.get(known.octants.len() + EXTRA_KEPT..));
+            search.reached_by.insert(cell, crowd);
             if let Some(first) = beyond.first() {
                 let side = map.side_of(cell, map.rows[*first as usize].position);
-                flow.start(cell, side, beyond.get(KEPT..));
+                search.start(cell, side, beyond.get(EXTRA_KEPT..));
             }
         }
-        Ok(flow)
+        Ok(search)
     }
 
     /// A new crowd in a cell, on a side, with its surplus grains. Returns it and the index of the side.
@@ -270,7 +269,7 @@ impl Flow {
     /// Cancel; errors of a grid.
     fn run(mut self, ctx: &Context, map: &mut Map<'_, '_>) -> Result<Vec<Move>> {
         let mut moves = Vec::new();
-        for _ in 0..FARTHEST {
+        for _ in 0..MAX_PATH {
             ctx.check()?;
             let visits = self.advance();
             if visits.is_empty() {
@@ -279,31 +278,33 @@ impl Flow {
             let mut cells: Vec<Cell> = visits.iter().map(|(cell, _)| *cell).collect();
             cells.sort_unstable();
             cells.dedup();
-            map.see(cells.iter().copied())?;
-            let known: Vec<Known> = cells.par_iter().map(|cell| map.know(*cell, false)).collect();
+            map.load_surfaces(cells.iter().copied())?;
+            let known: Vec<CellContents> = cells.par_iter().map(|cell| map.contents(*cell, false)).collect();
             let first = self.sides.len();
-            let (sides, known): (Vec<Side>, Vec<_>) =
-                known.into_iter().map(|Known { side, count, eighths }| (side, (count, eighths))).unzip();
+            let (sides, known): (Vec<Side>, Vec<_>) = known
+                .into_iter()
+                .map(|CellContents { side, count, octants }| (side, (count, octants)))
+                .unzip();
             self.sides.extend(sides);
             let mut front = Vec::new();
             for (cell, from) in visits {
                 let index = cells.partition_point(|other| *other < cell);
                 let (_, crowd, side) = self.front[from];
                 let reached = &self.sides[first + index];
-                if reached.distance <= -DEEPEST || reached.is_across(&self.sides[side]) {
+                if reached.distance <= -MAX_DEPTH || reached.is_across(&self.sides[side]) {
                     continue;
                 }
-                let crowd = self.part_of(crowd);
-                match self.came.entry(cell) {
+                let crowd = self.root(crowd);
+                match self.reached_by.entry(cell) {
                     Entry::Occupied(entry) => {
                         let (other, _) = *entry.get();
-                        self.join(crowd, other);
+                        self.merge(crowd, other);
                     }
                     Entry::Vacant(entry) => {
                         entry.insert((crowd, first + index));
-                        let (count, eighths) = &known[index];
-                        let room = LOOSE.saturating_sub(*count);
-                        for (position, _) in eighths.iter().filter(|(_, is_taken)| !is_taken).take(room) {
+                        let (count, octants) = &known[index];
+                        let room = FREE_BELOW.saturating_sub(*count);
+                        for (position, _) in octants.iter().filter(|(_, is_taken)| !is_taken).take(room) {
                             let Some(slot) = self.pools[crowd as usize].pop() else { break };
                             moves.push(Move { slot, cell, position: *position });
                         }
@@ -322,17 +323,17 @@ impl Flow {
         let mut visits = Vec::new();
         for from in 0..self.front.len() {
             let (cell, crowd, side) = self.front[from];
-            let crowd = self.part_of(crowd);
+            let crowd = self.root(crowd);
             if self.pools[crowd as usize].is_empty() {
                 continue;
             }
             for step in (0..27).filter(|step| *step != 13) {
                 let [x, y, z] = cell;
                 let near = [x + step / 9 - 1, y + step / 3 % 3 - 1, z + step % 3 - 1];
-                match self.came.get(&near) {
+                match self.reached_by.get(&near) {
                     None => visits.push((near, from)),
                     Some(&(other, beside)) if !self.sides[beside].is_across(&self.sides[side]) => {
-                        self.join(crowd, other);
+                        self.merge(crowd, other);
                     }
                     Some(_) => (),
                 }
@@ -342,7 +343,7 @@ impl Flow {
     }
 
     /// The crowd that a crowd was merged into.
-    fn part_of(&self, crowd: u32) -> u32 {
+    fn root(&self, crowd: u32) -> u32 {
         let mut crowd = crowd;
         while self.parents[crowd as usize] != crowd {
             crowd = self.parents[crowd as usize];
@@ -351,8 +352,8 @@ impl Flow {
     }
 
     /// Merges two crowds that meet.
-    fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.part_of(a), self.part_of(b));
+    fn merge(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
         if a != b {
             let (into, from) = (a.min(b), a.max(b));
             self.parents[from as usize] = into;
@@ -363,7 +364,7 @@ impl Flow {
 }
 
 /// The cell of a position in a block.
-fn cell(at: At, position: V) -> Cell {
+fn cell(at: BlockIndex, position: V) -> Cell {
     [0, 1, 2].map(|axis| at[axis] * PER_BLOCK + (position[axis] / CELL) as i32)
 }
 
@@ -373,23 +374,23 @@ fn index_of(position: V) -> usize {
 }
 
 /// The cell of an index in a block.
-fn cell_of(at: At, index: usize) -> Cell {
+fn cell_of(at: BlockIndex, index: usize) -> Cell {
     let edge = PER_BLOCK as usize;
     let within = [index / edge / edge, index / edge % edge, index % edge];
     [0, 1, 2].map(|axis| at[axis] * PER_BLOCK + within[axis] as i32)
 }
 
 /// The block of a cell.
-fn block(cell: Cell) -> At {
+fn block(cell: Cell) -> BlockIndex {
     cell.map(|at| at.div_euclid(PER_BLOCK))
 }
 
 /// A jittered position in an octant of a cell (diameters, from the cell's minimum corner).
-fn scattered(cell: Cell, eighth: usize) -> V {
-    let hash = crate::snow::grains::birth::sourcing::hash(eighth as u64, 0, cell.map(i64::from));
+fn jittered_position(cell: Cell, octant: usize) -> V {
+    let hash = crate::snow::grains::birth::sourcing::hash(octant as u64, 0, cell.map(i64::from));
     [0, 1, 2].map(|axis: usize| {
         let share = (hash >> (21 * axis) & 0x1f_ffff) as f32 / 1_048_576.0 - 1.0;
-        0.25 * CELL + 0.5 * CELL * (eighth >> axis & 1) as f32 + JITTER * share
+        0.25 * CELL + 0.5 * CELL * (octant >> axis & 1) as f32 + JITTER * share
     })
 }
 
@@ -400,7 +401,7 @@ mod tests {
     use crate::geometry::mesh::TriMesh;
     use crate::snow::grains::colliders::set::Floor;
     use crate::snow::grains::colliders::shell::Shell;
-    use crate::snow::grains::heap::MOST;
+    use crate::snow::grains::heap::MAX_IN_CELL;
 
     /// Positions (m) of grains of diameter 1 m on a floor, beside a mesh, after crowding was relieved.
     fn spread(positions: &[DVec3], mesh: Option<(TriMesh, bool)>) -> Vec<DVec3> {
@@ -413,11 +414,11 @@ mod tests {
         if let Some((mesh, closed)) = mesh {
             let pose: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast::<f64>()).collect();
             let mut shell = Shell::new(0.5, mesh.triangles, closed, pose.clone());
-            shell.follow(&pose);
+            shell.advance(&pose);
             colliders.shells.push((shell, Box::new(|_, _| Ok(()))));
         }
         let ctx = Context::new(Pool::new(2).unwrap());
-        ctx.step(1, || ctx.phase("move", || heap.make_room(&ctx, &colliders, MOST))).unwrap();
+        ctx.step(1, || ctx.phase("move", || heap.make_room(&ctx, &colliders, MAX_IN_CELL))).unwrap();
         assert_eq!(heap.ids(), (0..positions.len() as u32).collect::<Vec<u32>>());
         heap.positions().collect()
     }
@@ -433,7 +434,7 @@ mod tests {
     #[test]
     fn grains_at_one_place_spread_and_stay_above_the_floor() {
         let positions = spread(&[DVec3::new(0.3, 0.6, -0.2); 3000], None);
-        assert!(fullest(&positions) <= MOST, "{}", fullest(&positions));
+        assert!(fullest(&positions) <= MAX_IN_CELL, "{}", fullest(&positions));
         assert!(positions.iter().all(|position| position.y >= 0.5), "one is in the floor");
         // A hemisphere with seven grains per eight cubic diameters.
         let farthest = positions.iter().map(|position| position.norm()).fold(0.0, f64::max);
@@ -473,7 +474,7 @@ mod tests {
                 }
                 let from = normal * (shift + 0.7 * side) + DVec3::y() * 0.6;
                 let positions = spread(&[from; 2000], Some((turned, false)));
-                assert!(fullest(&positions) <= MOST);
+                assert!(fullest(&positions) <= MAX_IN_CELL);
                 let is_beside = |position: &DVec3| (position.dot(&normal) - shift) * side >= 0.49;
                 assert!(
                     positions.iter().all(is_beside),

@@ -16,9 +16,9 @@ pub const SURROUNDED: usize = 6;
 /// second (beta), `dt` the sub-step (s): the drag coefficient, -ln(beta), is multiplied by the share of missing neighbours.
 pub fn air_by_neighbours(air: f64, dt: f64) -> [f32; SURROUNDED + 1] {
     let mut all = [0.0; SURROUNDED + 1];
-    for (count, taken) in all.iter_mut().enumerate() {
+    for (count, removed) in all.iter_mut().enumerate() {
         let missing = (SURROUNDED - count) as f64 / SURROUNDED as f64;
-        *taken = (1.0 - libm::pow(air, dt * missing)) as f32;
+        *removed = (1.0 - libm::pow(air, dt * missing)) as f32;
     }
     all
 }

@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use super::blocks::At;
+use super::blocks::BlockIndex;
 use super::layout::world;
 use super::rest;
 use super::rows::{Row, norm};
@@ -19,10 +19,10 @@ use crate::snow::grains::heap::Heap;
 /// Speed above which a grain is fast, in sqrt(g d): a slower one rises by at most d / 32, too little to leave the hollow
 /// between the grains below it.
 const FAST: f64 = 0.25;
-/// Edge of a cell as a share of the distance, but not below [`LEAST`].
-const EDGE: f64 = 0.25;
+/// Edge of a cell as a share of the distance, but not below [`MIN_EDGE`].
+const EDGE_SHARE: f64 = 0.25;
 /// Minimum edge of a cell (diameters), so that a cell holds many grains.
-const LEAST: f64 = 4.0;
+const MIN_EDGE: f64 = 4.0;
 
 type Cell = [i32; 3];
 
@@ -42,13 +42,13 @@ impl Heap {
         shells: &mut [(Shell, Pose<'_>)],
     ) -> Result<()> {
         let diameter = self.diameter;
-        let edge = (EDGE * distance).max(LEAST * diameter);
+        let edge = (EDGE_SHARE * distance).max(MIN_EDGE * diameter);
         let fast = (FAST * (gravity.abs() * diameter).sqrt()) as f32;
         let is_fast = |row: &Row| norm(row.velocity) > fast;
         // A grain at the top of its flight is slow but unsupported.
         let may_rest =
             |row: &Row| !row.rests() && row.is_supported() && !rest::has_just_woken(row) && !is_fast(row);
-        let cell = |row: &Row, at: &At| -> Cell {
+        let cell = |row: &Row, at: &BlockIndex| -> Cell {
             world(*at, row.position, diameter).map(|x| (x / edge).floor() as i32).into()
         };
         let mut cells = self.cells(&may_rest, &cell);
@@ -65,8 +65,8 @@ impl Heap {
                 }
                 at(share, &mut pose)?;
                 // The first call makes it the next pose, the second the current one.
-                shell.follow(&pose);
-                shell.follow(&pose);
+                shell.advance(&pose);
+                shell.advance(&pose);
                 let shell = &*shell;
                 let is_free = |cell: &Cell| shell.distance(middle(cell), within).is_none();
                 cells = cells.into_par_iter().filter(is_free).collect();
@@ -80,13 +80,13 @@ impl Heap {
         Ok(())
     }
 
-    /// The cells that contain a grain for which `is_one` holds, ascending.
+    /// The cells that contain a grain for which `selects` holds, ascending.
     fn cells(
         &self,
-        is_one: &(impl Fn(&Row) -> bool + Sync),
-        cell: &(impl Fn(&Row, &At) -> Cell + Sync),
+        selects: &(impl Fn(&Row) -> bool + Sync),
+        cell: &(impl Fn(&Row, &BlockIndex) -> Cell + Sync),
     ) -> Vec<Cell> {
-        let rows = self.rows.par_iter().zip(&self.at).filter(|(row, _)| is_one(row));
+        let rows = self.rows.par_iter().zip(&self.at).filter(|(row, _)| selects(row));
         let mut cells: Vec<Cell> = rows.map(|(row, at)| cell(row, at)).collect();
         cells.par_sort_unstable();
         cells.dedup();
@@ -96,13 +96,13 @@ impl Heap {
 
 /// The rows of cells that contain a point nearer than a distance (cells) to a point of the cell in the middle.
 fn runs(distance: f64) -> Vec<Run> {
-    let most = distance.ceil() as i32;
+    let reach = distance.ceil() as i32;
     // Minimum distance between two cells along an axis, squared.
     let gap = |steps: i32| f64::from((steps.abs() - 1).max(0)).powi(2);
     let mut runs = Vec::new();
-    for (x, y) in (-most..=most).flat_map(|x| (-most..=most).map(move |y| (x, y))) {
+    for (x, y) in (-reach..=reach).flat_map(|x| (-reach..=reach).map(move |y| (x, y))) {
         let is_within = |z: &i32| gap(x) + gap(y) + gap(*z) < distance * distance;
-        if let Some(z) = (0..=most).rev().find(is_within) {
+        if let Some(z) = (0..=reach).rev().find(is_within) {
             runs.push([x, y, z]);
         }
     }

@@ -7,8 +7,8 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::blocks::{ALL_CELLS, At, Block, CELLS, EDGE, Home, NONE};
-use super::pairs::{Batch, Held, SKIN, THIN_SKIN};
+use super::blocks::{ALL_CELLS, Block, BlockIndex, CELLS, EDGE, Home, NONE};
+use super::pairs::{Batch, PairImpulse, SKIN, THIN_SKIN};
 use super::rows::{Row, Shared, V, add, dot, norm, scaled};
 use crate::geometry::DVec3;
 use crate::numeric::lanes::LANES;
@@ -18,13 +18,13 @@ use crate::numeric::lists::{refill, reset};
 struct Mover {
     slot: u32,
     /// Index of its new block along each axis.
-    at: At,
+    at: BlockIndex,
     /// The new block if it exists and is adjacent to the old one, else [`NONE`].
     block: u32,
 }
 
-/// The block at `to` among those around the block at `from`; [`NONE`] if there is none or it is farther away.
-fn beside(from: At, near: &[u32; 27], to: At) -> u32 {
+/// The block at `to` if it exists and is adjacent to the one at `from`, else [`NONE`]; `near` are the blocks around `from`.
+fn adjacent_block(from: BlockIndex, near: &[u32; 27], to: BlockIndex) -> u32 {
     let [x, y, z] = [0, 1, 2].map(|axis| i64::from(to[axis]) - i64::from(from[axis]) + 1);
     if [x, y, z].iter().all(|step| (0..3).contains(step)) { near[(9 * x + 3 * y + z) as usize] } else { NONE }
 }
@@ -53,10 +53,10 @@ pub struct Layout {
     /// Whether one has since the start of the step.
     pub has_ever_moved: bool,
     /// Impulses of the last step with the block that owns the pair, sorted by block.
-    pub kept: Vec<(u32, Held)>,
+    pub kept: Vec<(u32, PairImpulse)>,
     /// Count of neighbours of each grain at the start of the step, if needed: see [`super::density`].
     pub neighbours: Vec<u8>,
-    index: HashMap<At, u32>,
+    index: HashMap<BlockIndex, u32>,
     column_index: HashMap<[i32; 2], u32>,
 }
 
@@ -69,11 +69,11 @@ struct Key {
 }
 
 /// Offset of block indices in a key, which holds 2^21 blocks along x and z and 2^14 upward.
-const MIDDLE: [i32; 3] = [1 << 20, 1 << 13, 1 << 20];
+const KEY_OFFSET: [i32; 3] = [1 << 20, 1 << 13, 1 << 20];
 
 /// Whether a block index fits into a sort key.
-pub fn holds(at: At) -> bool {
-    (0..3).all(|axis| (-MIDDLE[axis]..MIDDLE[axis]).contains(&at[axis]))
+pub fn is_in_range(at: BlockIndex) -> bool {
+    (0..3).all(|axis| (-KEY_OFFSET[axis]..KEY_OFFSET[axis]).contains(&at[axis]))
 }
 
 /// Index of the cell of a position in a block.
@@ -83,13 +83,13 @@ fn cell(position: V) -> usize {
 }
 
 /// The slots of grains, sorted by column, level, cell and identity. Grains in blocks that do not fit into a key are omitted.
-pub fn order(rows: &[Row], ids: &[u32], at: &[At]) -> Vec<u32> {
+pub fn order(rows: &[Row], ids: &[u32], at: &[BlockIndex]) -> Vec<u32> {
     let mut keys: Vec<Key> = (rows.par_iter(), ids.par_iter(), at.par_iter())
         .into_par_iter()
         .enumerate()
-        .filter(|(_, (_, _, at))| holds(**at))
+        .filter(|(_, (_, _, at))| is_in_range(**at))
         .map(|(from, (row, id, at))| {
-            let [x, y, z] = [0, 1, 2].map(|axis| (at[axis] + MIDDLE[axis]) as u64);
+            let [x, y, z] = [0, 1, 2].map(|axis| (at[axis] + KEY_OFFSET[axis]) as u64);
             Key {
                 cell: ((x << 21 | z) << 14 | y) << 8 | cell(row.position) as u64,
                 id: *id,
@@ -103,7 +103,7 @@ pub fn order(rows: &[Row], ids: &[u32], at: &[At]) -> Vec<u32> {
 
 impl Layout {
     /// Blocks of grains that are sorted as by [`order`]; pairs are not found yet.
-    pub fn new(rows: &mut [Row], ids: &[u32], at: &[At], ahead: f32) -> Self {
+    pub fn new(rows: &mut [Row], ids: &[u32], at: &[BlockIndex], ahead: f32) -> Self {
         let mut layout = Self { homes: vec![Home { block: NONE, rank: 0 }; at.len()], ..Self::default() };
         let is_first = |slot: &usize| *slot == 0 || at[*slot] != at[slot - 1];
         let mut firsts: Vec<usize> = (0..at.len()).into_par_iter().filter(is_first).collect();
@@ -118,7 +118,7 @@ impl Layout {
     }
 
     /// The block at an index; creates it if there is none.
-    pub fn block(&mut self, at: At) -> u32 {
+    pub fn block(&mut self, at: BlockIndex) -> u32 {
         if let Some(&index) = self.index.get(&at) {
             return index;
         }
@@ -147,11 +147,11 @@ impl Layout {
             is_reached: false,
             has_strayed: true,
             is_changed: true,
-            is_stirred: false,
+            has_ever_changed: false,
             lacks_touches: true,
             is_due: false,
             lacks_pairs: true,
-            is_found: false,
+            has_found_pairs: false,
         });
         let (columns, at) = (&mut self.columns, [at[0], at[2]]);
         self.batches.push(Vec::new());
@@ -167,19 +167,19 @@ impl Layout {
     }
 
     /// Moves members of strayed blocks to the blocks that they are in now, and sorts the members of every block that changed.
-    pub fn follow(&mut self, rows: &mut [Row], ids: &[u32], ahead: f32) {
+    pub fn update_members(&mut self, rows: &mut [Row], ids: &[u32], ahead: f32) {
         let shared = Shared::new(rows);
         let strayed = self.blocks.par_iter_mut().filter(|block| block.has_strayed);
         let movers: Vec<Vec<Mover>> = strayed
             .map(|block| {
-                (block.is_changed, block.is_stirred) = (true, true);
+                (block.is_changed, block.has_ever_changed) = (true, true);
                 let (mut gone, at, near) = (Vec::new(), block.at, block.near);
                 block.members.retain(|&slot| {
                     let mut now = at;
                     // SAFETY: a grain is a member of one block, which one task has.
                     settle(unsafe { shared.get(slot as usize) }, &mut now);
                     if now != at {
-                        gone.push(Mover { slot, at: now, block: beside(at, &near, now) });
+                        gone.push(Mover { slot, at: now, block: adjacent_block(at, &near, now) });
                     }
                     now == at
                 });
@@ -190,12 +190,12 @@ impl Layout {
         self.has_ever_moved |= self.has_moved;
         for Mover { slot, at, block } in movers.into_iter().flatten() {
             self.homes[slot as usize].block = NONE;
-            if holds(at) {
+            if is_in_range(at) {
                 let block = if block == NONE { self.block(at) } else { block };
                 self.homes[slot as usize].block = block;
                 let block = &mut self.blocks[block as usize];
                 block.members.push(slot);
-                (block.is_changed, block.is_stirred) = (true, true);
+                (block.is_changed, block.has_ever_changed) = (true, true);
                 if !block.has_strayed {
                     let position = anchor(&rows[slot as usize], ahead, block.skin);
                     block.anchors.iter_mut().zip(position).for_each(|(anchors, position)| {
@@ -204,7 +204,7 @@ impl Layout {
                 }
             }
         }
-        self.rank_members(rows, ids, ahead, |block| block.is_changed && block.is_stirred);
+        self.rank_members(rows, ids, ahead, |block| block.is_changed && block.has_ever_changed);
     }
 
     /// Sorts the members of some blocks; strayed blocks get new anchors.
@@ -225,7 +225,8 @@ impl Layout {
                     dot(velocity, velocity)
                 };
                 let fastest = block.members.iter().map(square).fold(0.0, f32::max).sqrt();
-                block.skin = if fastest * ahead / SUB_STEPS_AHEAD > FAST { THIN_SKIN } else { SKIN };
+                block.skin =
+                    if fastest * ahead / SUB_STEPS_AHEAD > FAST_DISPLACEMENT { THIN_SKIN } else { SKIN };
             }
             let position = |member: usize, slot: u32| {
                 if block.has_strayed {
@@ -283,7 +284,7 @@ impl Layout {
     }
 
     /// Marks the blocks whose contacts can matter: those awake and their neighbours, or all.
-    pub fn reach(&mut self, all: bool) {
+    pub fn mark_reached(&mut self, all: bool) {
         let awake: Vec<bool> = self.blocks.par_iter().map(|block| block.is_awake).collect();
         let is_awake = |&block: &u32| block != NONE && awake[block as usize];
         self.blocks
@@ -314,12 +315,12 @@ struct Ranking {
 /// Anchor of a grain, from which its pairs are found: slightly ahead of it, so that it takes longer to stray. `ahead` is the distance
 /// (diameters) that a grain covers at 1 m/s while its pairs should last.
 fn anchor(row: &Row, ahead: f32, skin: f32) -> V {
-    // Less than half the skin.
-    let most = 0.45 * skin;
-    let way = scaled(row.velocity, ahead);
-    let length = norm(way);
-    let share = if length > most { most / length } else { 1.0 };
-    let position = add(row.position, scaled(way, share));
+    // Less than half the skin, at which a grain strays.
+    let max = 0.45 * skin;
+    let displacement = scaled(row.velocity, ahead);
+    let length = norm(displacement);
+    let share = if length > max { max / length } else { 1.0 };
+    let position = add(row.position, scaled(displacement, share));
     position.map(|x| x.clamp(0.0, EDGE))
 }
 
@@ -327,22 +328,22 @@ fn anchor(row: &Row, ahead: f32, skin: f32) -> V {
 pub const SUB_STEPS_AHEAD: f32 = 6.0;
 /// Displacement (diameters) in a sub-step beyond which a thin skin is cheaper: some grain nearby then strays in every
 /// sub-step, and the pairs around it are found again.
-const FAST: f32 = 0.06;
+const FAST_DISPLACEMENT: f32 = 0.06;
 
 /// Moves a grain to the block that it lies in.
-pub fn settle(row: &mut Row, at: &mut At) {
+pub fn settle(row: &mut Row, at: &mut BlockIndex) {
     for axis in 0..3 {
-        let (position, since, at) = (&mut row.position[axis], &mut row.since[axis], &mut at[axis]);
+        let (position, reference, at) = (&mut row.position[axis], &mut row.reference[axis], &mut at[axis]);
         let blocks = (*position / EDGE).floor();
         if blocks != 0.0 {
             *at = at.saturating_add(blocks as i32);
             *position -= blocks * EDGE;
-            *since -= blocks * EDGE;
+            *reference -= blocks * EDGE;
             // A position just below 0 rounds to the edge itself.
             if *position >= EDGE {
                 *at = at.saturating_add(1);
                 *position = 0.0;
-                *since -= EDGE;
+                *reference -= EDGE;
             }
         }
         // A value so slightly below 0 that it, or an eighth of it, is a denormal that was flushed to 0.
@@ -353,14 +354,14 @@ pub fn settle(row: &mut Row, at: &mut At) {
 }
 
 /// World position (m) of a position in a block.
-pub fn world(at: At, position: V, diameter: f64) -> DVec3 {
+pub fn world(at: BlockIndex, position: V, diameter: f64) -> DVec3 {
     DVec3::from(
         [0, 1, 2].map(|axis| (f64::from(at[axis]) * f64::from(EDGE) + f64::from(position[axis])) * diameter),
     )
 }
 
 /// Block of a world position (m), and the position in it.
-pub fn locate(world: DVec3, diameter: f64) -> (At, V) {
+pub fn locate(world: DVec3, diameter: f64) -> (BlockIndex, V) {
     let mut row = Row::default();
     let mut at = [0; 3];
     for axis in 0..3 {
@@ -381,7 +382,7 @@ mod tests {
     #[test]
     fn every_position_settles_in_a_block() {
         for position in [-6.0e-38, -1.0e-45, -1.0e-8, -0.0, 0.0, 7.999_999_5, 8.0, -8.0, -8.1, 31.0, -1.0e6] {
-            let mut row = Row { position: [position; 3], since: [position; 3], ..Row::default() };
+            let mut row = Row { position: [position; 3], reference: [position; 3], ..Row::default() };
             let mut at = [3; 3];
             let flush = FlushDenormals::begin();
             settle(&mut row, &mut at);

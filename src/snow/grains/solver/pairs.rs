@@ -13,7 +13,7 @@ pub const SKIN: f32 = 0.25;
 pub const THIN_SKIN: f32 = 0.12;
 
 /// Bits of the slot in a code; the bits above are the step to the block of the other grain, two bits per axis.
-pub(super) const INDEX: u32 = 26;
+pub(super) const SLOT_BITS: u32 = 26;
 
 /// Eight pairs that share no grain. Unused lanes repeat the first one.
 #[derive(Clone, Copy)]
@@ -32,7 +32,7 @@ impl Batch {
     pub fn others(&self) -> [u32; LANES] {
         let mut others = self.codes;
         for code in &mut others {
-            *code = other(*code);
+            *code = slot_of(*code);
         }
         others
     }
@@ -43,7 +43,7 @@ impl Batch {
         let mut shift = [Lanes::default(); 3];
         for (axis, shift) in shift.iter_mut().enumerate() {
             for (lane, shift) in shift.0.iter_mut().enumerate() {
-                *shift = ((self.codes[lane] >> (INDEX + 2 * axis as u32) & 3) as i32 - 1) as f32 * EDGE;
+                *shift = ((self.codes[lane] >> (SLOT_BITS + 2 * axis as u32) & 3) as i32 - 1) as f32 * EDGE;
             }
         }
         shift
@@ -52,21 +52,21 @@ impl Batch {
     /// Visits the pairs that carry an impulse: their slots, the index of the other grain's block in [`Block::near`], and the
     /// impulse. Unused lanes repeat the first pair.
     #[inline(always)]
-    pub fn for_each_held(&self, mut visit: impl FnMut([u32; 2], usize, V)) {
+    pub fn for_each_impulse(&self, mut visit: impl FnMut([u32; 2], usize, V)) {
         for lane in 0..LANES {
             let impulse = [self.impulse[0].0[lane], self.impulse[1].0[lane], self.impulse[2].0[lane]];
             if impulse != [0.0; 3] {
-                let bits = self.codes[lane] >> INDEX;
+                let bits = self.codes[lane] >> SLOT_BITS;
                 let code = 9 * (bits & 3) + 3 * (bits >> 2 & 3) + (bits >> 4);
-                visit([self.owners[lane], other(self.codes[lane])], code as usize, impulse);
+                visit([self.owners[lane], slot_of(self.codes[lane])], code as usize, impulse);
             }
         }
     }
 
     /// The pairs that carry an impulse, each once.
-    pub fn held(&self) -> impl Iterator<Item = Held> + '_ {
-        let held = |lane: usize| Held {
-            grains: [self.owners[lane], other(self.codes[lane])],
+    pub fn held(&self) -> impl Iterator<Item = PairImpulse> + '_ {
+        let held = |lane: usize| PairImpulse {
+            grains: [self.owners[lane], slot_of(self.codes[lane])],
             impulse: [0, 1, 2].map(|axis: usize| self.impulse[axis].0[lane]),
         };
         self.lanes().map(held).filter(|held| held.impulse != [0.0; 3])
@@ -81,28 +81,28 @@ impl Batch {
 
 /// The impulse of a pair between two steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Held {
+pub struct PairImpulse {
     /// Slots of the grains.
     pub grains: [u32; 2],
     /// On the first grain (m/s).
     pub impulse: V,
 }
 
-impl Held {
+impl PairImpulse {
     /// With the grains swapped.
-    pub fn turned(self) -> Self {
+    pub fn swapped(self) -> Self {
         let [a, b] = self.grains;
         Self { grains: [b, a], impulse: self.impulse.map(|x| -x) }
     }
 
     /// With the lower slot first.
     pub fn in_order(self) -> Self {
-        if self.grains[0] < self.grains[1] { self } else { self.turned() }
+        if self.grains[0] < self.grains[1] { self } else { self.swapped() }
     }
 }
 
 /// The slot in a code.
 #[inline(always)]
-pub(super) fn other(code: u32) -> u32 {
-    code & ((1 << INDEX) - 1)
+pub(super) fn slot_of(code: u32) -> u32 {
+    code & ((1 << SLOT_BITS) - 1)
 }

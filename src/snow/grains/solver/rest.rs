@@ -8,7 +8,7 @@
 use super::rows::{Row, SUPPORTED, dot, sub};
 
 /// Displacement (diameters) beyond which a grain counts as moving.
-const WAY: f32 = 0.01;
+const MAX_STILL: f32 = 0.01;
 /// Largest gap (diameters) at which a moving grain wakes another.
 pub const NEAR: f32 = 0.1;
 /// Value of `still`: the grain has just woken.
@@ -17,8 +17,8 @@ const JUST_WOKEN: f32 = f32::MAX;
 pub const WOKEN: f32 = 2.0;
 /// Time without motion before a grain rests, in standard sub-steps of sqrt(0.02 d / g), so that grains of every size behave alike.
 const PATIENCE: f64 = 96.0;
-/// The same for an unsupported grain, as a multiple.
-const HELD: f32 = 4.0;
+/// Multiple of [`PATIENCE`] for an unsupported grain.
+const UNSUPPORTED: f32 = 4.0;
 /// Time for which a grain that has moved counts as moving, in the same unit.
 const MOVING: f64 = 16.0;
 
@@ -40,13 +40,13 @@ impl Rest {
         let gravity = if floats { 9.81 } else { gravity.abs() };
         let sub_steps = |times: f64| (times * (0.02 * diameter / gravity).sqrt() / dt).ceil() as f32;
         let patience = sub_steps(PATIENCE).max(16.0);
-        let long_patience = if floats { f32::INFINITY } else { HELD * patience };
+        let long_patience = if floats { f32::INFINITY } else { UNSUPPORTED * patience };
         Self { patience, long_patience, moving: sub_steps(MOVING).max(4.0) }
     }
 }
 
 /// Updates the state of a grain at the end of a sub-step; without a rule, grains never rest.
-pub fn judge(row: &mut Row, rule: Option<Rest>) {
+pub fn update(row: &mut Row, rule: Option<Rest>) {
     let (is_woken, is_supported) = (row.marks >= WOKEN, row.marks == 1.0 || row.marks == WOKEN + 1.0);
     (row.push, row.marks) = ([0.0; 3], 0.0);
     if row.rests() {
@@ -57,10 +57,10 @@ pub fn judge(row: &mut Row, rule: Option<Rest>) {
     }
     let moving = rule.map_or(0.0, |rule| rule.moving);
     row.still = if row.still == JUST_WOKEN { moving } else { row.still };
-    row.hold = if is_supported { 1.0 + SUPPORTED } else { 1.0 };
-    let way = sub(row.position, row.since);
-    if dot(way, way) > WAY * WAY {
-        (row.since, row.still) = (row.position, 0.0);
+    row.mass_state = if is_supported { 1.0 + SUPPORTED } else { 1.0 };
+    let displacement = sub(row.position, row.reference);
+    if dot(displacement, displacement) > MAX_STILL * MAX_STILL {
+        (row.reference, row.still) = (row.position, 0.0);
     } else {
         row.still += 1.0;
     }
@@ -72,7 +72,7 @@ pub fn judge(row: &mut Row, rule: Option<Rest>) {
 
 /// Puts a grain to rest: it stops and supports others.
 pub fn stop(row: &mut Row) {
-    (row.hold, row.velocity) = (SUPPORTED, [0.0; 3]);
+    (row.mass_state, row.velocity) = (SUPPORTED, [0.0; 3]);
 }
 
 /// Whether a grain was woken, or its waiting time restarted, since the last sub-step.
@@ -83,12 +83,12 @@ pub fn has_just_woken(row: &Row) -> bool {
 /// Wakes a grain; it does not count as moving until it has moved.
 pub fn wake(row: &mut Row) {
     if row.rests() {
-        row.hold = 1.0 + SUPPORTED;
-        begin_again(row);
+        row.mass_state = 1.0 + SUPPORTED;
+        restart_wait(row);
     }
 }
 
 /// Restarts the time that the grain must lie still.
-pub fn begin_again(row: &mut Row) {
-    (row.since, row.still) = (row.position, JUST_WOKEN);
+pub fn restart_wait(row: &mut Row) {
+    (row.reference, row.still) = (row.position, JUST_WOKEN);
 }

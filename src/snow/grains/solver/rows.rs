@@ -17,35 +17,36 @@ pub struct Row {
     /// Position within its block (diameters), relative to the block's minimum corner.
     pub position: V,
     /// Inverse mass (1, or 0 at rest), plus 2 if a chain of contacts led down to something fixed in the last sub-step.
-    pub hold: f32,
+    pub mass_state: f32,
     /// Velocity (m/s).
     pub velocity: V,
-    /// Sub-steps since it was at `since`; a special value if it has just woken.
+    /// Number of sub-steps since it was at `reference`; a special value if it has just woken.
     pub still: f32,
     /// Displacement (diameters) in this sub-step that removes overlap and never becomes velocity.
     pub push: V,
-    /// Result of the contacts of this sub-step: 1 if supported, plus 2 if something wakes it.
+    /// Set by the contacts of this sub-step: 1 if supported, plus 2 if something wakes it.
     pub marks: f32,
-    /// Reference position: the grain counts as moving once it is too far from it (diameters, like `position`).
-    pub since: V,
+    /// Position (diameters, like `position`) from which displacements are measured: beyond a small one the grain counts
+    /// as moving.
+    pub reference: V,
     /// Distance (diameters) that meshes may travel from the start of the step before one can touch it.
     pub limit: f32,
 }
 
-/// Added to `hold`: supported.
+/// Added to `mass_state`: supported.
 pub const SUPPORTED: f32 = 2.0;
 
 impl Row {
     /// Inverse mass: 1, or 0 at rest.
     #[inline(always)]
     pub fn weight(&self) -> f32 {
-        if self.is_supported() { self.hold - SUPPORTED } else { self.hold }
+        if self.is_supported() { self.mass_state - SUPPORTED } else { self.mass_state }
     }
 
     /// Whether a chain of contacts led down to something fixed in the last sub-step.
     #[inline(always)]
     pub fn is_supported(&self) -> bool {
-        self.hold >= SUPPORTED
+        self.mass_state >= SUPPORTED
     }
 
     /// Whether it rests.
@@ -58,15 +59,15 @@ impl Row {
 /// Four consecutive numbers of a row, starting with the position, velocity or push.
 #[derive(Clone, Copy)]
 pub enum Part {
-    /// `position` and `hold`.
-    Place = 0,
+    /// `position` and `mass_state`.
+    Position = 0,
     /// `velocity` and `still`.
     Velocity = 4,
     /// `push` and `marks`.
     Push = 8,
 }
 
-/// A slice that tasks change concurrently, each its own elements.
+/// A slice of which tasks change different elements concurrently.
 pub struct Shared<'a, T> {
     first: *mut T,
     count: usize,
@@ -81,7 +82,7 @@ impl<T> Clone for Shared<'_, T> {
 
 impl<T> Copy for Shared<'_, T> {}
 
-// SAFETY: it lends elements of a slice that is borrowed mutably; whoever calls `get` keeps them apart.
+// SAFETY: it lends elements of a slice that is borrowed mutably; callers of `get` keep them apart.
 unsafe impl<T: Send> Sync for Shared<'_, T> {}
 // SAFETY: as above.
 unsafe impl<T: Send> Send for Shared<'_, T> {}

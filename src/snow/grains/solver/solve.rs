@@ -5,7 +5,7 @@
 //! Moreau 1988; small steps: Macklin et al. 2019), whose total is bounded by Coulomb's cone, and overlap is removed by a *push*, a
 //! displacement that never becomes velocity (split impulse: Guendelman et al. 2003). Impulses are equal and opposite, so a free heap keeps
 //! its momentum. Pushes move the upper of two grains if a chain of contacts supports the lower one (mass scaling by height: Macklin et al.
-//! 2014), so that a heap of any depth is as dense as its packing after one upward sweep. Impulses favour the upper grain slightly if chains
+//! 2014), so that one upward sweep gives a heap of any depth the density of its packing. Impulses favour the upper grain slightly if chains
 //! support both, so that a deep bed keeps its slope. A sinking grain also loses the part of its velocity that its push undid.
 //!
 //! Columns are swept upward in a fixed order, in four sets within which they share no grain: any number of threads gives the same bytes.
@@ -14,7 +14,7 @@
 use rayon::prelude::*;
 
 use super::blocks::Block;
-use super::collide::{Coefficients, Contact, Eight, FARTHEST, STEEP, TOUCHING, collide};
+use super::collide::{Coefficients, Contact, EightGrains, MAX_CORRECTION, MIN_UPWARD, TOUCHING, collide};
 use super::layout::Layout;
 use super::pairs::Batch;
 use super::rest;
@@ -69,8 +69,8 @@ enum Pass {
 
 /// Visits the contacts of some columns, upward.
 ///
-/// Two columns of a colour lie at least two apart. A task changes the members of its own column and their partners in pairs,
-/// whose anchors lie within the reach of a contact of it, less than half a column's width.
+/// No two columns of a colour are adjacent. A task changes the members of its own column and their partners in pairs, whose anchors lie
+/// within the reach of a contact of the column, which is less than half a column's width.
 fn sweep(rows: &mut [Row], layout: &mut Layout, colour: &[u32], pass: Pass, c: &Coefficients) {
     let rows = Shared::new(rows);
     let (columns, blocks) = (&layout.columns, Shared::new(&mut layout.blocks));
@@ -88,13 +88,13 @@ fn sweep(rows: &mut [Row], layout: &mut Layout, colour: &[u32], pass: Pass, c: &
                     dispatch!(begin_batches(rows: Shared<'_, Row>, batches: &[Batch], c: &Coefficients));
                 }
                 Pass::Solve => {
-                    resist_all(rows, touches, false, c);
+                    correct_touches(rows, touches, false, c);
                     dispatch!(solve_batches::<false>(
                         rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients
                     ));
                 }
                 Pass::SolveLast => {
-                    resist_all(rows, touches, true, c);
+                    correct_touches(rows, touches, true, c);
                     dispatch!(solve_batches::<true>(
                         rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coefficients
                     ));
@@ -129,7 +129,7 @@ fn accelerate(rows: &mut [Row], layout: &mut Layout, c: &Coefficients) {
 
 /// Applies the impulse of a touch from the last sub-step, none after a bounce; a fast approach starts a bounce.
 fn begin_touch(row: &mut Row, touch: &mut Touch, c: &Coefficients) {
-    touch.forget_bounce();
+    touch.clear_bounce();
     touch.friction_now = friction(row, touch, c);
     if c.restitution > 0.0 && !row.rests() {
         let approach = -dot(sub(row.velocity, touch.velocity), touch.normal);
@@ -144,11 +144,11 @@ fn begin_touch(row: &mut Row, touch: &mut Touch, c: &Coefficients) {
 /// Friction of a touch in this sub-step.
 ///
 /// A collider holds a grain with its own friction until the grain slides: a resting grain stays, up to the angle whose tangent is that
-/// friction. A real grain that slides would roll, which these cannot. It therefore gets the friction between grains, which is lower for the
-/// same reason, plus the slope of the surface, so that it stops wherever a grain can lie, and slides by Coulomb's law where none can. With
-/// full friction, columns that collapse run out a third less far than in experiments, where the ground does not matter (Lube et al. 2004):
-/// their lowest layer never moves. Two kinds keep full friction: grains that attract each other, which stick together and do not roll, and
-/// those on a moving collider, which carries them along with the friction that it was given.
+/// friction. A real grain that slides would roll, which these cannot. A sliding grain therefore gets the friction between grains, which is
+/// lower for the same reason, plus the slope of the surface. So it stops wherever a grain can lie, and slides by Coulomb's law where none
+/// can. With full friction, columns that collapse run out a third less far than in experiments, where the ground does not matter (Lube et
+/// al. 2004): their lowest layer never moves. Two kinds keep full friction: grains that attract each other, which stick together and do not
+/// roll, and those on a moving collider, which carries them along with the friction that it was given.
 fn friction(row: &Row, touch: &Touch, c: &Coefficients) -> f32 {
     if c.attraction > 0.0 || touch.velocity != [0.0; 3] {
         return touch.friction;
@@ -156,7 +156,7 @@ fn friction(row: &Row, touch: &Touch, c: &Coefficients) -> f32 {
     let velocity = sub(sub(row.velocity, scaled(c.gravity, c.dt)), touch.velocity);
     let sliding = sub(velocity, scaled(touch.normal, dot(velocity, touch.normal)));
     let cosine = dot(touch.normal, c.up);
-    if dot(sliding, sliding) <= c.slides || cosine < STEEP {
+    if dot(sliding, sliding) <= c.slides || cosine < MIN_UPWARD {
         return touch.friction;
     }
     let slope = (1.0 - cosine * cosine).max(0.0).sqrt() / cosine;
@@ -168,10 +168,10 @@ fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients, motion: Moti
     let rows = Shared::new(rows);
     let reached = layout.blocks.par_iter_mut().filter(|block| block.is_reached);
     let fastest = reached.map(|block| {
-        resist_all(rows, &mut block.touches, true, c);
+        correct_touches(rows, &mut block.touches, true, c);
         for touch in block.touches.iter().filter(|touch| touch.is_ground) {
             // SAFETY: a touch's grain is a member of its block, which one task has.
-            hold(unsafe { rows.get(touch.grain as usize) }, touch, c);
+            keep_outside_ground(unsafe { rows.get(touch.grain as usize) }, touch, c);
         }
         let far = (0.5 * block.skin).powi(2);
         let mut fastest = 0.0f32;
@@ -181,10 +181,10 @@ fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients, motion: Moti
             // SAFETY: a grain is a member of one block, which one task has.
             let row = unsafe { rows.get(slot as usize) };
             if !row.rests() {
-                move_on(row, c, &motion);
+                advance_grain(row, c, &motion);
                 fastest = fastest.max(dot(row.velocity, row.velocity));
             }
-            rest::judge(row, c.rest);
+            rest::update(row, c.rest);
             let strayed = [0, 1, 2].map(|axis| row.position[axis] - anchors[axis][member]);
             block.has_strayed |= dot(strayed, strayed) > far;
             block.is_awake |= !row.rests();
@@ -198,19 +198,19 @@ fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients, motion: Moti
 ///
 /// Each contact removes part of its own overlap, so the pushes on a grain that is pressed from all sides add up to more than is needed to
 /// resolve them all: their sum is bounded too.
-fn move_on(row: &mut Row, c: &Coefficients, motion: &Motion) {
-    row.push = bounded(row.push, FARTHEST);
+fn advance_grain(row: &mut Row, c: &Coefficients, motion: &Motion) {
+    row.push = bounded(row.push, MAX_CORRECTION);
     // The limit excludes the speed that gravity adds in this sub-step: a grain that falls or slides down a slope keeps accelerating.
     let fall = scaled(c.gravity, c.dt);
     let driven = sub(row.velocity, fall);
-    let most = motion.fastest * motion.fastest;
-    if dot(row.velocity, row.velocity) > most && dot(driven, driven) > most + dot(fall, fall) {
+    let max = motion.fastest * motion.fastest;
+    if dot(row.velocity, row.velocity) > max && dot(driven, driven) > max + dot(fall, fall) {
         row.velocity = add(bounded(driven, motion.fastest), fall);
     }
-    let way = add(scaled(row.velocity, c.dt / c.diameter), row.push);
-    row.position = add(row.position, way);
+    let displacement = add(scaled(row.velocity, c.dt / c.diameter), row.push);
+    row.position = add(row.position, displacement);
     // The travel of the meshes, which uses up the limit, includes `along`.
-    row.limit += norm(motion.along) - norm(sub(way, motion.along));
+    row.limit += norm(motion.along) - norm(sub(displacement, motion.along));
     // Its square may be over 0 in diameters and underflow to 0 in m/s.
     let back = scaled(row.push, c.diameter / c.dt);
     let square = dot(back, back);
@@ -221,15 +221,15 @@ fn move_on(row: &mut Row, c: &Coefficients, motion: &Motion) {
 }
 
 /// Corrects the touches of a block.
-fn resist_all(rows: Shared<'_, Row>, touches: &mut [Touch], last: bool, c: &Coefficients) {
+fn correct_touches(rows: Shared<'_, Row>, touches: &mut [Touch], last: bool, c: &Coefficients) {
     for touch in touches {
         // SAFETY: a touch's grain is a member of its block, which one task has.
-        resist(unsafe { rows.get(touch.grain as usize) }, touch, c, last);
+        correct_touch(unsafe { rows.get(touch.grain as usize) }, touch, c, last);
     }
 }
 
 /// One correction of a touch.
-fn resist(row: &mut Row, touch: &mut Touch, c: &Coefficients, last: bool) {
+fn correct_touch(row: &mut Row, touch: &mut Touch, c: &Coefficients, last: bool) {
     if row.rests() {
         return;
     }
@@ -237,48 +237,48 @@ fn resist(row: &mut Row, touch: &mut Touch, c: &Coefficients, last: bool) {
     let gap = dot(normal, row.position) - touch.offset;
     let relative = sub(row.velocity, touch.velocity);
     let along = dot(relative, normal);
-    let least = if gap < c.band { -touch.stick * c.weight } else { 0.0 };
-    let closing = if gap > 0.0 && least == 0.0 { -gap * c.diameter / c.dt } else { 0.0 };
+    let min_impulse = if gap < c.band { -touch.stick * c.weight } else { 0.0 };
+    let closing = if gap > 0.0 && min_impulse == 0.0 { -gap * c.diameter / c.dt } else { 0.0 };
     let wanted = if touch.bounce > 0.0 { touch.bounce } else { closing };
-    let total = (touch.impulse + wanted - along).max(least);
+    let total = (touch.impulse + wanted - along).max(min_impulse);
     let sliding = sub(relative, scaled(normal, along));
-    let across = bounded(sub(touch.across, sliding), touch.friction_now * (total - least));
-    let impulse = add(scaled(normal, total - touch.impulse), sub(across, touch.across));
-    (touch.impulse, touch.across) = (total, across);
+    let tangential = bounded(sub(touch.tangential, sliding), touch.friction_now * (total - min_impulse));
+    let impulse = add(scaled(normal, total - touch.impulse), sub(tangential, touch.tangential));
+    (touch.impulse, touch.tangential) = (total, tangential);
     row.velocity = add(row.velocity, impulse);
-    if gap < TOUCHING && dot(normal, c.up) > STEEP && (row.marks == 0.0 || row.marks == rest::WOKEN) {
+    if gap < TOUCHING && dot(normal, c.up) > MIN_UPWARD && (row.marks == 0.0 || row.marks == rest::WOKEN) {
         row.marks += 1.0;
     }
     if last {
-        let missing = (if gap > 0.0 { -gap } else { (-gap).min(FARTHEST) }) - dot(row.push, normal);
+        let missing = (if gap > 0.0 { -gap } else { (-gap).min(MAX_CORRECTION) }) - dot(row.push, normal);
         if missing > 0.0 {
             row.push = add(row.push, scaled(normal, missing));
         }
     }
 }
 
-/// Keeps a grain in front of ground, whatever else presses on it: a grain pressed between an object, or the underside of the base layer,
-/// and the ground stays on the ground.
-fn hold(row: &mut Row, touch: &Touch, c: &Coefficients) {
+/// Keeps a grain in front of ground, whatever else presses on it: a grain between the ground and an object, or the underside of the base
+/// layer, stays on the ground.
+fn keep_outside_ground(row: &mut Row, touch: &Touch, c: &Coefficients) {
     if row.rests() {
         return;
     }
     let gap = dot(touch.normal, row.position) - touch.offset;
     let moves = dot(row.velocity, touch.normal) * (c.dt / c.diameter) + dot(row.push, touch.normal);
-    let missing = (-gap).min(FARTHEST) - moves;
-    if missing > HELD {
+    let missing = (-gap).min(MAX_CORRECTION) - moves;
+    if missing > MAX_GROUND_DEPTH {
         row.push = add(row.push, scaled(touch.normal, missing));
     }
 }
 
 /// Depth (diameters) to which other contacts may press a grain into ground.
-const HELD: f32 = 1.0e-3;
+const MAX_GROUND_DEPTH: f32 = 1.0e-3;
 
-/// A vector shortened to at most a length.
+/// A vector shortened to at most a length `max`.
 #[inline(always)]
-fn bounded(vector: V, most: f32) -> V {
+fn bounded(vector: V, max: f32) -> V {
     let square = dot(vector, vector);
-    if square > most * most { scaled(vector, most / square.sqrt()) } else { vector }
+    if square > max * max { scaled(vector, max / square.sqrt()) } else { vector }
 }
 
 /// Applies the impulses of the last sub-step.
@@ -292,7 +292,7 @@ fn begin_batches(rows: Shared<'_, Row>, batches: &[Batch], c: &Coefficients) {
         // SAFETY: no other task has these grains (see `sweep`); the pairs of a batch share none.
         unsafe {
             let others = batch.others();
-            let (a, b) = (Eight::load(rows, &batch.owners), Eight::load(rows, &others));
+            let (a, b) = (EightGrains::load(rows, &batch.owners), EightGrains::load(rows, &others));
             let (a, b) = Contact::between(&a, &b, batch, c).kick(a, b, batch.impulse);
             a.store(rows, &batch.owners);
             b.store(rows, &others);
@@ -309,7 +309,7 @@ fn solve_batches<const LAST: bool>(rows: Shared<'_, Row>, batches: &mut [Batch],
         let others = batch.others();
         // SAFETY: as in `begin_batches`.
         unsafe {
-            let (a, b) = (Eight::load(rows, &batch.owners), Eight::load(rows, &others));
+            let (a, b) = (EightGrains::load(rows, &batch.owners), EightGrains::load(rows, &others));
             let (mut a, mut b, contact) = collide(a, b, batch, c);
             if !LAST {
                 a.store(rows, &batch.owners);
@@ -366,9 +366,9 @@ mod tests {
         let mut push = 1.0e-24;
         while push < 1.0 {
             for velocity in [[0.0, -0.1, 0.0], [0.1, 0.0, 0.0], [0.0; 3]] {
-                let mut row = Row { hold: 1.0 + SUPPORTED, velocity, ..Row::default() };
+                let mut row = Row { mass_state: 1.0 + SUPPORTED, velocity, ..Row::default() };
                 row.push = [0.0, push, 0.0];
-                move_on(&mut row, &c, &motion);
+                advance_grain(&mut row, &c, &motion);
                 assert!(row.velocity.iter().all(|x| x.is_finite()), "{push} {velocity:?}");
             }
             push *= 1.01;

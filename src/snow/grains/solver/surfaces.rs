@@ -1,6 +1,6 @@
 //! The surfaces around grains that are inside a surface or in a crowd.
 
-use super::blocks::At;
+use super::blocks::BlockIndex;
 use super::rows::{V, dot};
 use crate::error::Result;
 use crate::geometry::DVec3;
@@ -8,18 +8,18 @@ use crate::snow::bounds::bounds;
 use crate::snow::grains::colliders::field::Window;
 use crate::snow::grains::colliders::nearby::Nearby;
 use crate::snow::grains::colliders::set::{Colliders, Floor, Pose};
-use crate::snow::grains::colliders::shell::{DEPTHS, Shell};
+use crate::snow::grains::colliders::shell::{DEPTH_REACH, Shell};
 
 /// Search distance for surfaces (diameters): more than the longest step of a crowd's path, which starts anywhere in a cell with
 /// edges of two diameters and ends at the centre of the next, so that a mesh between the two is near both.
 const FAR: f64 = 5.5;
-/// Share of [`DEEP`] that released grains must stay within, so that it still holds after positions are written with less
+/// Released grains are at most this share of [`DEEP`] deep, so that they stay within it when positions are written with less
 /// precision.
-const ROUNDED: f64 = 0.98;
+const RELEASED_SHARE: f64 = 0.98;
 /// Maximum number of times that a grain is moved out of each surface.
-const ROUNDS: usize = 16;
-/// Maximum displacement (diameters).
-const FARTHEST: f64 = 1.5;
+const MAX_ROUNDS: usize = 16;
+/// Maximum displacement of a released grain (diameters).
+const MAX_DISPLACEMENT: f64 = 1.5;
 /// Cosine between the outward directions on the two sides of a mesh.
 const OPPOSITE: f64 = -0.5;
 
@@ -45,7 +45,7 @@ impl Side {
     /// Whether a mesh lies between this position and another nearby.
     pub fn is_across(&self, other: &Self) -> bool {
         let is_same = |(mesh, out): &(usize, DVec3)| {
-            other.out.iter().any(|(index, way)| index == mesh && way.dot(out) < OPPOSITE)
+            other.out.iter().any(|(index, direction)| index == mesh && direction.dot(out) < OPPOSITE)
         };
         self.out.iter().any(is_same)
     }
@@ -58,7 +58,7 @@ impl<'a> Surfaces<'a> {
     /// Errors of a grid.
     pub fn around(
         colliders: &'a Colliders<'_>,
-        blocks: &[At],
+        blocks: &[BlockIndex],
         diameter: f64,
         margin: f64,
     ) -> Result<Vec<Self>> {
@@ -96,64 +96,64 @@ impl<'a> Surfaces<'a> {
     /// Collects the triangles near positions (m) for [`Surfaces::release`].
     pub fn find(&self, positions: impl Iterator<Item = DVec3>, nearby: &mut Vec<Nearby>) {
         let [low, high] = bounds(positions);
-        let room = DVec3::repeat((FARTHEST + 0.5) * self.diameter);
+        let margin = DVec3::repeat((MAX_DISPLACEMENT + 0.5) * self.diameter);
         nearby.resize_with(self.shells.len(), Nearby::default);
         for ((shell, _), nearby) in self.shells.iter().zip(nearby) {
-            nearby.find(shell, &[low - room, high + room], 0.5 * DEPTHS * self.diameter);
+            nearby.find(shell, &[low - margin, high + margin], 0.5 * DEPTH_REACH * self.diameter);
         }
     }
 
     /// Displacement (diameters) that moves a grain at a position (m) out of the surfaces, and whether it is trapped: it has no free
     /// position, and is only moved out of the ground.
     pub fn release(&self, from: DVec3, nearby: &mut [Nearby]) -> (V, bool) {
-        let way = |position: DVec3| {
-            let way = (position - from) / self.diameter;
-            [0, 1, 2].map(|axis| way[axis] as f32)
+        let displacement = |position: DVec3| {
+            let displacement = (position - from) / self.diameter;
+            [0, 1, 2].map(|axis| displacement[axis] as f32)
         };
         let mut position = from;
-        for _ in 0..ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             if self.push_out(&mut position, nearby, false) {
-                return (way(position), false);
+                return (displacement(position), false);
             }
-            if (position - from).norm() > FARTHEST * self.diameter {
+            if (position - from).norm() > MAX_DISPLACEMENT * self.diameter {
                 break;
             }
         }
         position = from;
-        for _ in 0..ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             if self.push_out(&mut position, nearby, true) {
                 break;
             }
         }
-        (way(position), true)
+        (displacement(position), true)
     }
 
     /// Moves a position (m) out of each surface in turn, or only out of ground; returns whether it was outside of all.
     fn push_out(&self, position: &mut DVec3, nearby: &mut [Nearby], only_ground: bool) -> bool {
         let half = 0.5 * self.diameter;
         let mut is_out = true;
-        let mut tell = |depth: f64| is_out &= depth / self.diameter <= ROUNDED * DEEP;
+        let mut check = |depth: f64| is_out &= depth / self.diameter <= RELEASED_SHARE * DEEP;
         if let Some(floor) = &self.floor {
             let depth = floor.height + half - position.y;
-            tell(depth);
+            check(depth);
             position.y += depth.max(0.0);
         }
         if let Some((cell, window)) = self.field.as_ref().filter(|_| !only_ground) {
             let (distance, gradient) = window.sample([0, 1, 2].map(|axis| position[axis] / cell));
             let depth = half - f64::from(distance);
-            tell(depth);
-            let steep = dot(gradient, gradient).sqrt();
-            if depth > 0.0 && steep > 1.0e-6 {
-                *position += DVec3::from(gradient.map(f64::from)) * (depth / f64::from(steep));
+            check(depth);
+            let slope = dot(gradient, gradient).sqrt();
+            if depth > 0.0 && slope > 1.0e-6 {
+                *position += DVec3::from(gradient.map(f64::from)) * (depth / f64::from(slope));
             }
         }
         for ((shell, _), nearby) in self.shells.iter().zip(nearby) {
             if only_ground && !shell.is_ground() {
                 continue;
             }
-            let nearest = nearby.nearest(shell, *position, DEPTHS * half);
-            if let Some((depth, out)) = shell.depth_beside(*position, half, nearest) {
-                tell(depth);
+            let nearest = nearby.nearest(shell, *position, DEPTH_REACH * half);
+            if let Some((depth, out)) = shell.depth_from(*position, half, nearest) {
+                check(depth);
                 *position += out * depth.max(0.0);
             }
         }

@@ -4,14 +4,14 @@
 
 use rayon::prelude::*;
 
-use super::blocks::At;
+use super::blocks::BlockIndex;
 use super::layout::{Layout, world};
 use super::rows::{Row, V, add, dot};
 use super::surfaces::{DEEP, Surfaces};
 use crate::error::Result;
-use crate::snow::grains::colliders::field::Seen;
+use crate::snow::grains::colliders::field::CachedField;
 use crate::snow::grains::colliders::nearby::Nearby;
-use crate::snow::grains::colliders::search::around;
+use crate::snow::grains::colliders::search::block_reach;
 use crate::snow::grains::colliders::set::Colliders;
 use crate::snow::grains::colliders::touch::Touch;
 
@@ -21,7 +21,7 @@ const NEAR: f32 = 0.1;
 const MARGIN: f64 = 4.0;
 
 /// Input at the end of a step.
-pub struct End<'a> {
+pub struct StepEnd<'a> {
     /// Positions of the grains.
     pub layout: &'a Layout,
     /// Diameter of a grain (m).
@@ -32,17 +32,23 @@ pub struct End<'a> {
     pub travelled: f64,
 }
 
-impl End<'_> {
-    /// Members of each block that may be inside a surface, with the level set as the blocks saw it; `before` has the identities of the
-    /// grains that the last step left trapped, ascending.
-    pub fn deep(&self, rows: &[Row], ids: &[u32], before: &[u32], field: Option<&Seen<'_>>) -> Vec<Vec<u32>> {
+impl StepEnd<'_> {
+    /// Members of each block that may be inside a surface, with the level set as the blocks saw it; `trapped_before` has the identities of
+    /// the grains that the last step left trapped, ascending.
+    pub fn deep(
+        &self,
+        rows: &[Row],
+        ids: &[u32],
+        trapped_before: &[u32],
+        field: Option<&CachedField<'_>>,
+    ) -> Vec<Vec<u32>> {
         (0..self.layout.blocks.len())
             .into_par_iter()
-            .map(|index| self.deep_members(index, rows, ids, before, field))
+            .map(|index| self.deep_members(index, rows, ids, trapped_before, field))
             .collect()
     }
 
-    /// Moves the grains that [`End::deep`] found out of surfaces. Returns the identities of the trapped ones, ascending.
+    /// Moves the grains that [`StepEnd::deep`] found out of surfaces. Returns the identities of the trapped ones, ascending.
     ///
     /// # Errors
     /// A pose that cannot be computed; errors of a grid.
@@ -58,7 +64,8 @@ impl End<'_> {
         if which.is_empty() {
             return Ok(Vec::new());
         }
-        let blocks: Vec<At> = which.iter().map(|&block| self.layout.blocks[block as usize].at).collect();
+        let blocks: Vec<BlockIndex> =
+            which.iter().map(|&block| self.layout.blocks[block as usize].at).collect();
         let around = Surfaces::around(colliders, &blocks, self.diameter, MARGIN)?;
         let seen = &*rows;
         let blocks = which.par_iter().zip(&around).with_max_len(1);
@@ -71,8 +78,8 @@ impl End<'_> {
         });
         let released: Vec<Vec<(u32, (V, bool))>> = released.collect();
         let mut trapped = Vec::new();
-        for (slot, (way, is_trapped)) in released.into_iter().flatten() {
-            rows[slot as usize].position = add(rows[slot as usize].position, way);
+        for (slot, (displacement, is_trapped)) in released.into_iter().flatten() {
+            rows[slot as usize].position = add(rows[slot as usize].position, displacement);
             if is_trapped {
                 trapped.push(ids[slot as usize]);
             }
@@ -88,11 +95,11 @@ impl End<'_> {
         index: usize,
         rows: &[Row],
         ids: &[u32],
-        before: &[u32],
-        field: Option<&Seen<'_>>,
+        trapped_before: &[u32],
+        field: Option<&CachedField<'_>>,
     ) -> Vec<u32> {
         let block = &self.layout.blocks[index];
-        let has_mesh = f64::from(block.limit) - self.travelled < around();
+        let has_mesh = f64::from(block.limit) - self.travelled < block_reach();
         let is_deep = |touch: &&Touch| {
             let row = &rows[touch.grain as usize];
             if !touch.has_plane() {
@@ -113,11 +120,11 @@ impl End<'_> {
         };
         let had_no_room = |slot: &&u32| {
             let slot = **slot as usize;
-            rows[slot].rests() && before.binary_search(&ids[slot]).is_ok()
+            rows[slot].rests() && trapped_before.binary_search(&ids[slot]).is_ok()
         };
         let mut deep: Vec<u32> = block.touches.iter().filter(is_deep).map(|touch| touch.grain).collect();
         deep.extend(block.members.iter().filter(was_pushed_in));
-        if !before.is_empty() {
+        if !trapped_before.is_empty() {
             deep.extend(block.members.iter().filter(had_no_room));
         }
         deep.sort_unstable();

@@ -5,14 +5,14 @@ use rayon::prelude::*;
 use crate::flow::{Coord, Flow, tiles::FACES};
 use crate::geometry::DVec3;
 
-/// Cells between adjacent positions.
+/// Cells between adjacent samples.
 const SPACING: usize = 4;
-/// Positions along the edge of a tile, both ends included.
+/// Samples along the edge of a tile, both ends included.
 const EDGE: usize = 8 / SPACING + 1;
-/// Positions of a tile.
+/// Number of samples of a tile.
 pub const POSITIONS: usize = EDGE * EDGE * EDGE;
 
-/// The positions (m) of a tile whose cells have the edge `cell` (m).
+/// Positions (m) of a tile's samples, for cells with the edge `cell` (m).
 pub fn positions(tile: Coord, cell: f64) -> [DVec3; POSITIONS] {
     std::array::from_fn(|index| {
         let at = [index / (EDGE * EDGE), index / EDGE % EDGE, index % EDGE];
@@ -21,8 +21,8 @@ pub fn positions(tile: Coord, cell: f64) -> [DVec3; POSITIONS] {
     })
 }
 
-/// Changes the velocity (m/s) at all faces of active cells to `change(old, value)`, where `value` is interpolated linearly from the vectors
-/// at the positions of their tiles.
+/// Changes the velocity (m/s) at all faces of active cells to `change(old, value)`, where `value` is interpolated linearly from the samples
+/// of the tile.
 pub fn change(flow: &mut Flow, values: &[[[f32; 3]; POSITIONS]], change: impl Fn(f32, f32) -> f32 + Sync) {
     let (tiles, velocity, _) = flow.fields();
     for (axis, field) in velocity.iter_mut().enumerate() {

@@ -10,7 +10,7 @@ use crate::flow::{Flow, tiles::FACES};
 
 /// Gravity acts where there is mist (thesis section 3.4.1): a face between two cells with mist gains the full `speed` (m/s, upward), a face
 /// at the border of the mist half of it.
-pub fn fall(flow: &mut Flow, speed: f32) {
+pub fn apply_gravity(flow: &mut Flow, speed: f32) {
     if speed == 0.0 {
         return;
     }

@@ -1,6 +1,6 @@
 //! Turbulence: eddies of a given size push the air. Their acceleration is the curl of three smooth noises, which has no divergence
-//! (Bridson, Houriham and Nordenstam 2007). The wind carries them along, and each set of noises fades into an unrelated one, so that eddies
-//! come and go: noises that only move would keep the same eddies for ever.
+//! (Bridson, Houriham and Nordenstam 2007). The wind carries them along, and each set of noises fades into an independent one, so that
+//! eddies come and go: noises that only move would keep the same eddies for ever.
 
 use fastnoise_lite::{FastNoiseLite, NoiseType};
 use rayon::prelude::*;
@@ -12,8 +12,8 @@ use crate::flow::Flow;
 use crate::geometry::DVec3;
 use crate::snow::mist::Params;
 
-/// Root mean square of the noises' curl in units of their size (measured by the test).
-const UNIT: f64 = 0.231_8;
+/// Inverse of the root mean square of the noises' curl, with lengths in units of their size (the test measures it).
+const CURL_SCALE: f64 = 0.231_8;
 /// Finite-difference step, as a share of the size.
 const STEP: f64 = 0.05;
 /// Time (s) over which one set of noises fades into the next.
@@ -86,11 +86,12 @@ impl Eddies {
             off[axis] = half;
             (self.potential(component, position + off) - self.potential(component, position - off)) / STEP
         };
-        UNIT * DVec3::new(slope(2, 1) - slope(1, 2), slope(0, 2) - slope(2, 0), slope(1, 0) - slope(0, 1))
+        CURL_SCALE
+            * DVec3::new(slope(2, 1) - slope(1, 2), slope(0, 2) - slope(2, 0), slope(1, 0) - slope(0, 1))
     }
 }
 
-/// The noise of a component in a lifetime, unrelated to all others.
+/// The noise of a component in a lifetime, independent of all others.
 fn noise(seed: i32, life: i64, component: u64) -> FastNoiseLite {
     let mut noise = FastNoiseLite::with_seed(mixed(seed, life, component));
     noise.set_noise_type(Some(NoiseType::OpenSimplex2));

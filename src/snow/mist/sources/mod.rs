@@ -1,10 +1,11 @@
-//! Where grains raise mist (thesis section 3.4.2): in a tube of twice the grain's radius along the path of each fast grain within the frame.
+//! Sources of mist (thesis section 3.4.2): it is raised in a tube of twice the grain's radius along the path of each fast grain within the
+//! frame.
 
 pub(super) mod new_mist;
 
 use rayon::prelude::*;
 
-use super::{LEAST, Params};
+use super::{MIN_DENSITY, Params};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::flow::{Coord, Tile};
@@ -12,12 +13,12 @@ use crate::geometry::DVec3;
 use crate::numeric::checks::ensure;
 
 /// Maximum coordinate of a grain (cells).
-const FARTHEST_CELL: f64 = 1e7;
-/// Maximum acceleration (m/s2) of a grain that is assumed to fly freely, under gravity and air drag; from twice this on it is assumed to be
-/// hit.
-const FREE: f64 = 20.0;
+const MAX_CELL: f64 = 1e7;
+/// Maximum acceleration (m/s2) of a grain in free flight, under gravity and air drag. A grain with at least twice this is assumed to
+/// collide.
+const FREE_ACCELERATION: f64 = 20.0;
 /// Largest radius of a grain (cells).
-const LARGEST: f64 = 64.0;
+const MAX_RADIUS: f64 = 64.0;
 
 /// A grain that raises mist.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,26 +51,26 @@ impl Source {
         let [x, y, z] = self.position.into();
         let at = format!("grain at ({x:.3}, {y:.3}, {z:.3}) m");
         ensure(
-            self.position.iter().all(|x| x.abs() <= FARTHEST_CELL * cell),
-            format_args!("the {at} is farther than {FARTHEST_CELL:.0} cells from the origin"),
+            self.position.iter().all(|x| x.abs() <= MAX_CELL * cell),
+            format_args!("the {at} is farther than {MAX_CELL:.0} cells from the origin"),
         )?;
         if !self.velocity.iter().all(|speed| speed.is_finite()) {
             return Err(Error::argument(format!("the velocity of the {at} is not finite")));
         }
         if let Some(start) = self.start {
-            let is_near = start.position.iter().all(|x| x.abs() <= FARTHEST_CELL * cell);
+            let is_near = start.position.iter().all(|x| x.abs() <= MAX_CELL * cell);
             ensure(
                 is_near && start.velocity.iter().all(|speed| speed.is_finite()),
                 format_args!(
-                    "the {at} began the step with a velocity that is not finite, or farther than {FARTHEST_CELL:.0} cells from the origin"
+                    "the {at} began the step with a velocity that is not finite, or farther than {MAX_CELL:.0} cells from the origin"
                 ),
             )?;
         }
-        let most = LARGEST * cell;
-        if !(0.0..=most).contains(&self.radius) {
+        let max = MAX_RADIUS * cell;
+        if !(0.0..=max).contains(&self.radius) {
             let radius = self.radius;
             return Err(Error::argument(format!(
-                "the {at} has a radius of {radius} m, not within 0 to {most}"
+                "the {at} has a radius of {radius} m, not within 0 to {max}"
             )));
         }
         Ok(())
@@ -83,7 +84,7 @@ impl Source {
     /// Its largest speed (m/s) on any axis.
     pub(super) fn fastest(&self) -> f32 {
         let start = self.start.map_or([0.0; 3], |start| start.velocity);
-        self.velocity.iter().chain(&start).fold(0.0, |most, speed| most.max(speed.abs()))
+        self.velocity.iter().chain(&start).fold(0.0, |max, speed| max.max(speed.abs()))
     }
 
     /// Its motion in a step of `dt` (s) from a start.
@@ -94,19 +95,19 @@ impl Source {
         let middle = (off.dot(&gain) / gain.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
         // The displacement that the velocities do not explain is spread over the step.
         let rest = gain * middle - off;
-        let free = 2.0 - gain.norm() / (FREE * dt * dt);
+        let free = 2.0 - gain.norm() / (FREE_ACCELERATION * dt * dt);
         let width = 2.0 * middle.min(1.0 - middle) * free.clamp(0.0, 1.0);
         Motion { from: start.position, before: before + rest, gain, middle, width }
     }
 }
 
 /// The motion of a grain in a step: its velocity changes once, uniformly over an interval. The interval is centred on the moment for which
-/// both velocities lead as close as possible to its end position; it is the whole step for a grain in flight and an instant for one that is
-/// hit.
+/// both velocities lead as close as possible to its end position; it is the whole step for a grain in flight and an instant for one
+/// that collides.
 struct Motion {
     /// Position (m) at the beginning.
     from: DVec3,
-    /// Displacement (m) over a whole step at the first velocity, and the additional displacement at the last one.
+    /// Displacement (m) over a whole step at the first velocity, and by how much that at the last velocity differs.
     before: DVec3,
     gain: DVec3,
     /// Centre and length of the interval: shares 0..=1 of the step.
@@ -147,9 +148,9 @@ pub struct Seed {
 
 /// The paths (m) of grains that raise mist in the part of a step of `dt` (s) between two shares 0..=1 of it, at their mean velocity in that
 /// part.
-pub fn ways(sources: &[Source], params: &Params, dt: f64, [first, last]: [f64; 2]) -> Vec<Way> {
+pub fn paths(sources: &[Source], params: &Params, dt: f64, [first, last]: [f64; 2]) -> Vec<Path> {
     let time = (last - first) * dt;
-    let way = |source: &Source| {
+    let path = |source: &Source| {
         let (velocity, ends) = match &source.start {
             None => {
                 let now = DVec3::from(source.velocity.map(f64::from)) * dt;
@@ -162,13 +163,13 @@ pub fn ways(sources: &[Source], params: &Params, dt: f64, [first, last]: [f64; 2
                 ([mean.x as f32, mean.y as f32, mean.z as f32], ends)
             }
         };
-        raises(velocity, params).then_some(Way { ends, velocity, radius: source.radius })
+        raises(velocity, params).then_some(Path { ends, velocity, radius: source.radius })
     };
-    sources.iter().filter_map(way).collect()
+    sources.iter().filter_map(path).collect()
 }
 
 /// The path of a grain.
-pub struct Way {
+pub struct Path {
     /// Its ends (m).
     ends: [DVec3; 2],
     /// Velocity (m/s) and radius (m) of the grain.
@@ -180,49 +181,52 @@ pub struct Way {
 ///
 /// # Errors
 /// More memory than the context allows.
-pub fn seeds(ctx: &Context, ways: &[Way], params: &Params) -> Result<Vec<Seed>> {
+pub fn seeds(ctx: &Context, paths: &[Path], params: &Params) -> Result<Vec<Seed>> {
     const WHAT: &str = "new mist";
-    let boxed = |way: &Way| {
-        let [low, high] = box_of(way, params.cell);
+    let tiles_in_box = |path: &Path| {
+        let [low, high] = tile_bounds(path, params.cell);
         (0..3).map(|axis| u64::from(high[axis].abs_diff(low[axis])) + 1).product::<u64>()
     };
-    ctx.allow(WHAT, ways.iter().map(boxed).sum::<u64>().saturating_mul(size_of::<(Coord, u32)>() as u64))?;
-    let mut touched: Vec<(Coord, u32)> = ways
+    ctx.allow(
+        WHAT,
+        paths.iter().map(tiles_in_box).sum::<u64>().saturating_mul(size_of::<(Coord, u32)>() as u64),
+    )?;
+    let mut touched: Vec<(Coord, u32)> = paths
         .par_iter()
         .enumerate()
-        .flat_map_iter(|(index, way)| {
-            tiles_of(way, params.cell).into_iter().map(move |coord| (coord, index as u32))
+        .flat_map_iter(|(index, path)| {
+            tiles_of(path, params.cell).into_iter().map(move |coord| (coord, index as u32))
         })
         .collect();
     touched.par_sort_unstable();
     let groups: Vec<&[(Coord, u32)]> = touched.chunk_by(|a, b| a.0 == b.0).collect();
     ctx.allow(WHAT, groups.len() as u64 * SEED_BYTES)?;
-    let seeds = groups.into_par_iter().map(|group| seed(group, ways, params));
-    // Tubes miss many tiles that they might touch, and cover only a negligible part of others.
-    Ok(seeds.filter(|seed| seed.density.iter().any(|density| *density > LEAST)).collect())
+    let seeds = groups.into_par_iter().map(|group| seed(group, paths, params));
+    // Many of the tiles are missed by the tubes, or covered only to a negligible part.
+    Ok(seeds.filter(|seed| seed.density.iter().any(|density| *density > MIN_DENSITY)).collect())
 }
 
 /// Bytes of a seed.
 const SEED_BYTES: u64 = 4 * size_of::<Tile>() as u64;
 
 /// Minimum and maximum tile of the box around a path's tube.
-fn box_of(way: &Way, cell: f64) -> [Coord; 2] {
-    let [from, to] = way.ends;
-    let reach = DVec3::repeat(2.0 * way.radius + cell);
+fn tile_bounds(path: &Path, cell: f64) -> [Coord; 2] {
+    let [from, to] = path.ends;
+    let reach = DVec3::repeat(2.0 * path.radius + cell);
     let tile = |position: DVec3| [0, 1, 2].map(|axis| (position[axis] / (8.0 * cell)).floor() as i32);
     [tile(from.inf(&to) - reach), tile(from.sup(&to) + reach)]
 }
 
 /// Coordinates of the tiles that a path's tube may touch.
-fn tiles_of(way: &Way, cell: f64) -> Vec<Coord> {
-    let ([from, to], [low, high]) = (way.ends, box_of(way, cell));
+fn tiles_of(path: &Path, cell: f64) -> Vec<Coord> {
+    let ([from, to], [low, high]) = (path.ends, tile_bounds(path, cell));
     let mut out = Vec::new();
     for x in low[0]..=high[0] {
         for y in low[1]..=high[1] {
             for z in low[2]..=high[2] {
                 let middle = DVec3::new(f64::from(x) + 0.5, f64::from(y) + 0.5, f64::from(z) + 0.5);
                 let apart = distance(middle * (8.0 * cell), from, to);
-                if apart < 2.0 * way.radius + cell * (1.0 + 4.0 * 3f64.sqrt()) {
+                if apart < 2.0 * path.radius + cell * (1.0 + 4.0 * 3f64.sqrt()) {
                     out.push([x, y, z]);
                 }
             }
@@ -233,25 +237,24 @@ fn tiles_of(way: &Way, cell: f64) -> Vec<Coord> {
 
 /// Distance (m) of a position from a segment.
 fn distance(position: DVec3, from: DVec3, to: DVec3) -> f64 {
-    let (way, off) = (to - from, position - from);
-    let share = (off.dot(&way) / way.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-    (off - way * share).norm()
+    let (along, off) = (to - from, position - from);
+    let share = (off.dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    (off - along * share).norm()
 }
 
-fn seed(group: &[(Coord, u32)], ways: &[Way], params: &Params) -> Seed {
+fn seed(group: &[(Coord, u32)], paths: &[Path], params: &Params) -> Seed {
     let coord = group[0].0;
     let (mut density, mut velocity) = (Box::new([0.0f32; 512]), Box::new([[0.0f32; 512]; 3]));
     let mut weights = [0.0f32; 512];
     for (_, index) in group {
-        let Way { ends: [from, to], velocity: speed, radius } = ways[*index as usize];
+        let Path { ends: [from, to], velocity: speed, radius } = paths[*index as usize];
         let reach = DVec3::repeat(2.0 * radius + params.cell);
-        let least = (from.inf(&to) - reach) / params.cell;
-        let most = (from.sup(&to) + reach) / params.cell;
+        let low = (from.inf(&to) - reach) / params.cell;
+        let high = (from.sup(&to) + reach) / params.cell;
         // The cells of the tile that the tube may cover.
         let [x, y, z] = [0, 1, 2].map(|axis| {
             let first = f64::from(coord[axis] * 8);
-            (least[axis] - first).clamp(0.0, 8.0) as usize
-                ..(most[axis] - first).ceil().clamp(0.0, 8.0) as usize
+            (low[axis] - first).clamp(0.0, 8.0) as usize..(high[axis] - first).ceil().clamp(0.0, 8.0) as usize
         });
         let rows = x.flat_map(|x| y.clone().map(move |y| x << 6 | y << 3));
         for cell in rows.flat_map(|row| z.clone().map(move |z| row | z)) {

@@ -24,7 +24,7 @@ pub fn seeds(tiles: &[Coord], of: impl Fn([i32; 3]) -> (f32, [f32; 3])) -> Vec<S
 impl Mist {
     /// Adds new mist to air whose tiles exist: the larger density is kept, and the air takes on the new mist's velocity in proportion to
     /// how far the mist fills the cells.
-    pub(in crate::snow::mist) fn sow(&mut self, seeds: &[Seed]) {
+    pub(in crate::snow::mist) fn add_seeds(&mut self, seeds: &[Seed]) {
         let coords: Vec<Coord> = seeds.iter().map(|seed| seed.coord).collect();
         let (tiles, velocity, density) = self.flow.fields();
         let of = |slot: usize| {

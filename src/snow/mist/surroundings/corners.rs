@@ -31,8 +31,8 @@ impl Lattice {
     /// Minimum and maximum corner (m) of tiles.
     pub fn bounds(&self, tiles: &[Coord]) -> [DVec3; 2] {
         let low = |coord: &Coord| DVec3::from(coord.map(f64::from)) * (8.0 * self.cell);
-        let [least, greatest] = bounds(tiles.iter().map(low));
-        [least, greatest.add_scalar(8.0 * self.cell)]
+        let [min, max] = bounds(tiles.iter().map(low));
+        [min, max.add_scalar(8.0 * self.cell)]
     }
 
     /// All corners (m) of a tile.
@@ -66,7 +66,7 @@ enum Distances<'a> {
 }
 
 /// Maximum width of a tile (cells of a level set) whose leaves are searched; wider tiles have too many.
-const WIDEST: f64 = 24.0;
+const MAX_WIDTH: f64 = 24.0;
 
 impl<'a> Grid<'a> {
     pub fn new(
@@ -85,13 +85,14 @@ impl<'a> Grid<'a> {
             [low, high]
         });
         // Beside and above the level set nothing is solid; below it, the enclosed solid ends.
-        let is_near = |[least, most]: &[[i32; 3]; 2]| {
+        let is_near = |[tile_low, tile_high]: &[[i32; 3]; 2]| {
             (0..3).all(|axis| {
-                least[axis] <= high[axis].saturating_add(1) && most[axis] >= low[axis].saturating_sub(1)
+                tile_low[axis] <= high[axis].saturating_add(1)
+                    && tile_high[axis] >= low[axis].saturating_sub(1)
             })
         };
         let bounds: Vec<Option<[[i32; 3]; 2]>> = bounds.map(|bounds| Some(bounds).filter(is_near)).collect();
-        let mut all = if edge > WIDEST {
+        let mut all = if edge > MAX_WIDTH {
             let near = tiles.iter().zip(&bounds).filter(|(_, bounds)| bounds.is_some());
             let positions: Vec<DVec3> = near.flat_map(|(tile, _)| lattice.positions(*tile)).collect();
             let mut values = Vec::new();

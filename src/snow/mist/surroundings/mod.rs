@@ -20,7 +20,7 @@ use crate::flow::{Coord, Faces, Solids, Tiles};
 use crate::geometry::DVec3;
 use crate::snow::bounds::bounds;
 use crate::snow::grains::colliders::shell::Shell;
-use crate::snow::grains::{FASTEST_OBJECT, HOLES};
+use crate::snow::grains::{FASTEST_OBJECT, MAX_CLOSED_HOLES};
 use crate::sweep::{self, Body, Settings};
 use crate::vdb::FloatGrid;
 use corners::{Grid, Lattice};
@@ -41,22 +41,22 @@ pub struct Surroundings<'a> {
 /// The boundaries of a step: see [`Surroundings::during`].
 pub struct Walls<'a> {
     around: &'a Surroundings<'a>,
-    bodies: Vec<Moving<'a>>,
+    bodies: Vec<StepBody<'a>>,
     /// Start of the step, and its length (s).
     from: f64,
     dt: f64,
     /// Edge of the finest cells (m).
     cell: f64,
-    held: Mutex<Held>,
+    cache: Mutex<Cache>,
 }
 
-/// Results of a step that are requested again.
+/// Results that later calls in the same step request again.
 #[derive(Default)]
-struct Held {
-    /// Objects that stand still.
-    fixed: Option<Moment>,
+struct Cache {
+    /// Objects that do not move.
+    fixed: Option<Snapshot>,
     /// Moving objects at the last moment requested: finer and wider cells request the same one.
-    moving: Option<Moment>,
+    moving: Option<Snapshot>,
     /// The part of the base layer that moving objects have removed since the step began.
     opened: Option<Opened>,
     /// Faces of tiles that no moving object approaches in the step, by the cells' edge (m, its bits) and the tile; none: all are open.
@@ -64,7 +64,7 @@ struct Held {
 }
 
 /// Objects at a moment.
-struct Moment {
+struct Snapshot {
     /// Share 0..=1 of the step.
     share: f64,
     /// Indices of the objects in it.
@@ -85,11 +85,11 @@ struct Opened {
 }
 
 /// An object during a step.
-struct Moving<'a> {
+struct StepBody<'a> {
     body: &'a Body,
     /// Whether it has no inside.
     is_sheet: bool,
-    /// Whether it moves too fast to carry the air along: it then stands at its final position.
+    /// Whether it moves too fast to carry the air along: it is then at its final position throughout the step.
     jumps: bool,
     /// Whether it opens the base layer as it moves.
     opens: bool,
@@ -97,20 +97,21 @@ struct Moving<'a> {
     triangles: Vec<[u32; 3]>,
     /// Minimum and maximum corner over the step (m).
     bounds: [DVec3; 2],
-    /// Largest speed (m/s) of its points over the step.
+    /// Largest mean speed (m/s) of a vertex over the step.
     speed: f64,
 }
 
-/// Half thickness of a sheet (cells): the sheet then closes all faces next to it, at any position between them.
-const SHEET: f64 = 1.0;
+/// Half thickness of a sheet (cells): enough to close all faces next to the sheet, wherever it lies between them.
+const SHEET_HALF: f64 = 1.0;
 /// Share of the step over which the speed of a surface is measured.
 const INSTANT: f64 = 0.125;
 /// Distance from a surface (cells) within which covered faces move with it; faces farther inside do not touch air.
 const NEAR: f64 = 2.0;
-/// Maximum spacing of the corners (cells of the base) at which a narrow band of three cells on each side shows where the surface is.
-const BAND: f64 = 2.9;
-/// Maximum parts of a cell's edge. In cells wider than 11 voxels of the base, the base's surface is placed where the sign changes.
-const PARTS: usize = 4;
+/// Maximum spacing of the corners (cells of the base): with it, a narrow band of three cells on each side reaches a corner next to the
+/// surface.
+const MAX_SPACING: f64 = 2.9;
+/// Maximum number of parts of a cell's edge. In cells wider than 11 voxels of the base, only the sign change locates the base's surface.
+const MAX_PARTS: usize = 4;
 
 impl<'a> Surroundings<'a> {
     /// The walls in a step from `from` to `to` (s), for cells of an edge (m) and wider ones.
@@ -122,21 +123,21 @@ impl<'a> Surroundings<'a> {
         let removes = removes.map(|removes| *removes && self.base.is_some());
         let bodies = self.bodies.iter().zip(removes);
         let bodies =
-            bodies.map(|(body, removes)| Moving::new(body, removes, [from, to])).collect::<Result<_>>()?;
-        Ok(Walls { around: self, bodies, from, dt: to - from, cell, held: Mutex::default() })
+            bodies.map(|(body, removes)| StepBody::new(body, removes, [from, to])).collect::<Result<_>>()?;
+        Ok(Walls { around: self, bodies, from, dt: to - from, cell, cache: Mutex::default() })
     }
 }
 
-impl<'a> Moving<'a> {
+impl<'a> StepBody<'a> {
     fn new(body: &'a Body, removes: bool, [from, to]: [f64; 2]) -> Result<Self> {
         let (mut first, mut last) = (Vec::new(), Vec::new());
         body.closed_pose(from, &mut first)?;
         body.closed_pose(to, &mut last)?;
-        let is_sheet = body.share_of_caps(&first) >= HOLES || body.contradictions() > 0;
+        let is_sheet = body.share_of_caps(&first) >= MAX_CLOSED_HOLES || body.contradictions() > 0;
         let farthest = first.iter().zip(&last).map(|(a, b)| (b - a).norm()).fold(0.0, f64::max);
         let jumps = farthest > FASTEST_OBJECT * (to - from);
         // A rotation may carry vertices outside the bounding box of both poses.
-        let room = DVec3::repeat(if jumps { 0.0 } else { farthest });
+        let margin = DVec3::repeat(if jumps { 0.0 } else { farthest });
         let positions = last.iter().chain(first.iter().filter(|_| !jumps));
         let [low, high] = bounds(positions);
         Ok(Self {
@@ -145,15 +146,15 @@ impl<'a> Moving<'a> {
             jumps,
             opens: removes && farthest > 0.0 && !jumps && !is_sheet,
             triangles: body.closed_triangles().collect(),
-            bounds: [low - room, high + room],
+            bounds: [low - margin, high + margin],
             speed: if jumps { 0.0 } else { farthest / (to - from) },
         })
     }
 
     /// Whether it comes within a distance (m) of a box.
     fn is_near(&self, [low, high]: &[DVec3; 2], distance: f64) -> bool {
-        let room = DVec3::repeat(distance);
-        self.bounds[0] - room <= *high && *low <= self.bounds[1] + room
+        let margin = DVec3::repeat(distance);
+        self.bounds[0] - margin <= *high && *low <= self.bounds[1] + margin
     }
 }
 
@@ -168,21 +169,21 @@ impl Walls<'_> {
             return Ok(Solids::none(tiles));
         }
         let lattice = Lattice { cell, parts: self.parts() };
-        let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
-        let Held { fixed, moving, opened, faces: known } = &mut *held;
+        let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        let Cache { fixed, moving, opened, faces: known } = &mut *cache;
         let key = |tile: &Coord| (cell.to_bits(), *tile);
         let slots = (0..tiles.count()).filter(|slot| !known.contains_key(&key(&tiles.coords()[*slot])));
         let slots: Vec<usize> = slots.collect();
         let unknown: Vec<Coord> = slots.iter().map(|slot| tiles.coords()[*slot]).collect();
         let bounds = lattice.bounds(tiles.coords());
-        let is_near = |body: &Moving<'_>| body.is_near(&bounds, NEAR * cell);
-        let fixed = self.at(ctx, fixed, 1.0, |body| body.speed == 0.0 && is_near(body))?;
-        let moving = self.at(ctx, moving, share, |body| body.speed > 0.0 && is_near(body))?;
+        let is_near = |body: &StepBody<'_>| body.is_near(&bounds, NEAR * cell);
+        let fixed = self.snapshot(ctx, fixed, 1.0, |body| body.speed == 0.0 && is_near(body))?;
+        let moving = self.snapshot(ctx, moving, share, |body| body.speed > 0.0 && is_near(body))?;
         let opened = self.opened(ctx, opened, share, |body| body.opens && is_near(body))?;
         let grid = |grid| Grid::new(ctx, grid, &unknown, &lattice);
         // A level set with a narrower band has no distances that deep.
         let band = moving.solid.as_ref().map_or(0.0, |grid| f64::from(grid.background()));
-        let around = Around {
+        let around = SampledWalls {
             lattice,
             floor: self.around.floor,
             still: [grid(self.around.base)?, grid(fixed.solid.as_ref())?],
@@ -200,7 +201,7 @@ impl Walls<'_> {
         let mut out = Vec::new();
         for ((slot, tile), faces) in slots.into_iter().zip(&unknown).zip(made) {
             let bounds = lattice.bounds(&[*tile]);
-            let moves = |body: &Moving<'_>| body.speed > 0.0 && body.is_near(&bounds, NEAR * cell);
+            let moves = |body: &StepBody<'_>| body.speed > 0.0 && body.is_near(&bounds, NEAR * cell);
             match self.bodies.iter().any(moves) {
                 true => out.extend(faces.map(|faces| (slot as u32, faces))),
                 false => drop(known.insert(key(tile), faces)),
@@ -223,51 +224,52 @@ impl Walls<'_> {
         near.map(|body| body.speed).fold(0.0, f64::max)
     }
 
-    /// Number of parts into which the edge of a cell is divided, so that the base's band shows where its surface is in the finest cells, up
-    /// to [`PARTS`]. Wider cells are for air far away.
+    /// Number of parts into which the edge of a cell is divided, so that corners of the finest cells lie in the base's narrow band; at most
+    /// [`MAX_PARTS`]. Wider cells are for air far away.
     fn parts(&self) -> usize {
-        let most = self.around.base.map_or(f64::INFINITY, |base| BAND * base.voxel_size());
-        (1..PARTS).find(|parts| self.cell / *parts as f64 <= most).unwrap_or(PARTS)
+        let max_spacing = self.around.base.map_or(f64::INFINITY, |base| MAX_SPACING * base.voxel_size());
+        (1..MAX_PARTS).find(|parts| self.cell / *parts as f64 <= max_spacing).unwrap_or(MAX_PARTS)
     }
 
     /// The wanted objects at a share 0..=1 of the step; the cached ones if they match.
-    fn at<'h>(
+    fn snapshot<'h>(
         &self,
         ctx: &Context,
-        held: &'h mut Option<Moment>,
+        cache: &'h mut Option<Snapshot>,
         share: f64,
-        is_wanted: impl Fn(&Moving<'_>) -> bool,
-    ) -> Result<&'h Moment> {
+        is_wanted: impl Fn(&StepBody<'_>) -> bool,
+    ) -> Result<&'h Snapshot> {
         let near: Vec<usize> = (0..self.bodies.len()).filter(|body| is_wanted(&self.bodies[*body])).collect();
-        let has_all = |moment: &Moment| near.iter().all(|body| moment.near.contains(body));
-        let moment = match held.take().filter(|moment| moment.share == share && has_all(moment)) {
-            Some(moment) => moment,
+        let has_all = |snapshot: &Snapshot| near.iter().all(|body| snapshot.near.contains(body));
+        let snapshot = match cache.take().filter(|snapshot| snapshot.share == share && has_all(snapshot)) {
+            Some(snapshot) => snapshot,
             None => {
                 let solid = self.solid(ctx, &near, share)?;
                 let has_surface =
                     |body: &&usize| self.bodies[**body].is_sheet || self.bodies[**body].speed > 0.0;
                 let surfaces = near.iter().filter(has_surface).map(|body| self.surface(*body, share));
                 let surfaces = surfaces.collect::<Result<_>>()?;
-                Moment { share, near, solid, surfaces }
+                Snapshot { share, near, solid, surfaces }
             }
         };
-        Ok(held.insert(moment))
+        Ok(cache.insert(snapshot))
     }
 
     /// The level set of the volume that objects have swept since the step began; continues from the last one requested.
     fn opened<'h>(
         &self,
         ctx: &Context,
-        held: &'h mut Option<Opened>,
+        cache: &'h mut Option<Opened>,
         share: f64,
-        is_wanted: impl Fn(&Moving<'_>) -> bool,
+        is_wanted: impl Fn(&StepBody<'_>) -> bool,
     ) -> Result<Option<&'h FloatGrid>> {
         let near: Vec<usize> = (0..self.bodies.len()).filter(|body| is_wanted(&self.bodies[*body])).collect();
         let has_all = |opened: &Opened| near.iter().all(|body| opened.near.contains(body));
-        let (near, from, mut swept) = match held.take().filter(|held| held.share <= share && has_all(held)) {
-            Some(held) => (held.near, held.share, Some(held.swept)),
-            None => (near, 0.0, None),
-        };
+        let (near, from, mut swept) =
+            match cache.take().filter(|cache| cache.share <= share && has_all(cache)) {
+                Some(cache) => (cache.near, cache.share, Some(cache.swept)),
+                None => (near, 0.0, None),
+            };
         if swept.is_none() || from < share {
             let lattice = Lattice { cell: self.cell, parts: self.parts() };
             let settings = Settings::new(lattice.spacing());
@@ -280,11 +282,11 @@ impl Walls<'_> {
                 }
             }
         }
-        *held = swept.map(|swept| Opened { share, near, swept });
-        Ok(held.as_ref().map(|held| &held.swept))
+        *cache = swept.map(|swept| Opened { share, near, swept });
+        Ok(cache.as_ref().map(|cache| &cache.swept))
     }
 
-    fn time(&self, body: &Moving<'_>, share: f64) -> f64 {
+    fn time(&self, body: &StepBody<'_>, share: f64) -> f64 {
         self.from + self.dt * if body.jumps { 1.0 } else { share }
     }
 
@@ -312,7 +314,7 @@ impl Walls<'_> {
         let earlier = (share - INSTANT).max(0.0);
         body.body.closed_pose(self.time(body, earlier), &mut before)?;
         let mut shell = Shell::new(0.0, body.triangles.clone(), false, now);
-        shell.follow(&before);
+        shell.advance(&before);
         let passed = self.dt * (share - earlier);
         let rate = if passed > 0.0 { -1.0 / passed } else { 0.0 };
         Ok(Surface { body: index, shell, rate })
@@ -328,18 +330,18 @@ struct Surface {
     rate: f64,
 }
 
-/// All surroundings at a moment.
-struct Around<'a> {
+/// The base layer, the floor and objects at a moment, sampled around the tiles.
+struct SampledWalls<'a> {
     lattice: Lattice,
     floor: Option<f64>,
-    /// The base layer, and objects that stand still.
+    /// The base layer, and objects that do not move.
     still: [Option<Grid<'a>>; 2],
     /// The part of the base layer that moving objects have removed.
     opened: Option<Grid<'a>>,
     /// Moving objects.
     moving: Option<Grid<'a>>,
-    bodies: &'a [Moving<'a>],
-    /// Surfaces of objects that stand still, and of moving ones.
+    bodies: &'a [StepBody<'a>],
+    /// Surfaces of objects that do not move, and of moving ones.
     surfaces: [&'a [Surface]; 2],
     /// Signed distance (m) below which the velocity of a covered face does not matter.
     deepest: f64,
@@ -367,13 +369,13 @@ impl Corners {
     }
 }
 
-impl Around<'_> {
+impl SampledWalls<'_> {
     /// The faces of a tile with this `index` in the grids; none: all are open.
     fn faces(&self, index: usize, tile: Coord) -> Option<Faces> {
         let bounds = self.lattice.bounds(&[tile]);
         let is_sheet = |surface: &&Surface| {
             let body = &self.bodies[surface.body];
-            body.is_sheet && body.is_near(&bounds, SHEET * self.lattice.cell)
+            body.is_sheet && body.is_near(&bounds, SHEET_HALF * self.lattice.cell)
         };
         let sheets: [Vec<&Surface>; 2] =
             self.surfaces.map(|surfaces| surfaces.iter().filter(is_sheet).collect());
@@ -406,7 +408,7 @@ impl Around<'_> {
     fn corners(&self, index: usize, tile: Coord, sheets: &[Vec<&Surface>; 2]) -> Corners {
         let count = self.lattice.corners();
         let far = (NEAR * self.lattice.cell) as f32;
-        let half = SHEET * self.lattice.cell;
+        let half = SHEET_HALF * self.lattice.cell;
         let mut distances = [Vec::with_capacity(count.pow(3)), Vec::with_capacity(count.pow(3))];
         for corner in 0..count.pow(3) {
             let at = [corner / (count * count), corner / count % count, corner % count];
@@ -448,7 +450,7 @@ impl Around<'_> {
         sum / (parts * parts) as f32
     }
 
-    /// Speed (m/s), along the axis, of what covers a cell's lower face.
+    /// Speed (m/s), along the axis, of the solid that covers a cell's lower face.
     fn speed(&self, corners: &Corners, tile: Coord, axis: usize, cell: [usize; 3]) -> f32 {
         let parts = self.lattice.parts;
         // The corner nearest to the centre of the face.
@@ -462,7 +464,7 @@ impl Around<'_> {
         position[axis] -= half;
         let near = self.surfaces[1].iter().filter_map(|shell| {
             let found = shell.shell.nearest(position, NEAR * self.lattice.cell)?;
-            Some((found.square, found.motion[axis] * shell.rate))
+            Some((found.square, found.displacement[axis] * shell.rate))
         });
         let nearest = near.reduce(|a, b| if b.0 < a.0 { b } else { a });
         nearest.map_or(0.0, |(_, speed)| speed as f32)

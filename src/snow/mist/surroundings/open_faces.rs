@@ -3,13 +3,13 @@
 
 /// Open fraction below which a face counts as closed: flow through so small a gap is not resolved, and would make the pressure
 /// ill-conditioned.
-const LEAST: f32 = 0.05;
+const MIN_OPEN: f32 = 0.05;
 
 /// Open fraction of a square face with these signed distances (negative inside a solid) at its corners, in the order of two nested loops.
 pub fn open(corners: [f32; 4]) -> f32 {
     let [a, b, c, d] = corners;
-    let (least, greatest) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
-    match (least >= 0.0, greatest < 0.0) {
+    let (min, max) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
+    match (min >= 0.0, max < 0.0) {
         (true, _) => 1.0,
         (_, true) => 0.0,
         _ => cut([a, b, d, c]),
@@ -46,7 +46,7 @@ fn cut(ring: [f32; 4]) -> f32 {
             0.5 * (part(at(corner + 1), at(corner + 2)) + part(at(corner), at(corner + 3)))
         }
     };
-    if 1.0 - closed < LEAST { 0.0 } else { 1.0 - closed }
+    if 1.0 - closed < MIN_OPEN { 0.0 } else { 1.0 - closed }
 }
 
 #[cfg(test)]
@@ -68,7 +68,7 @@ mod tests {
                 let cells = (0..FINE).flat_map(|x| (0..FINE).map(move |y| (middle(x), middle(y))));
                 let free = cells.filter(|(x, y)| distance(*x, *y) > 0.0).count();
                 let wanted = free as f64 / f64::from(FINE * FINE);
-                let is_closed = open == 0.0 && wanted < f64::from(LEAST) + 0.012;
+                let is_closed = open == 0.0 && wanted < f64::from(MIN_OPEN) + 0.012;
                 let is_near = (f64::from(open) - wanted).abs() < 0.012;
                 assert!(is_near || is_closed, "{turn} {step}: {open} {wanted}");
             }

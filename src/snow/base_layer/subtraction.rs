@@ -1,7 +1,7 @@
-//! Removes a sweep from the snow, block by block: snow = max(snow, -sweep), removed = max(snow, sweep).
+//! Subtracts a sweep from the snow, block by block: snow = max(snow, -sweep), removed = max(snow, sweep).
 //!
-//! The intersection is taken before the subtraction: base(t) minus base(t + dt) would leave a ghost surface of zero thickness wherever
-//! nothing moved.
+//! The removed snow is the intersection with the sweep, not a difference of states: base(t) minus base(t + dt) would
+//! leave a ghost surface of zero thickness wherever nothing moved.
 
 use super::columns::{CELLS, add_by_cell};
 use super::voxel_fill::{self, filled};
@@ -13,7 +13,7 @@ use crate::vdb::Probe;
 pub struct Edit {
     /// The snow afterwards.
     pub surface: BlockEdit,
-    /// What was removed from it.
+    /// The removed snow; none if the block has none.
     pub removed: Option<BlockEdit>,
     /// Voxels whose value changed.
     pub changed: Mask,
@@ -67,8 +67,8 @@ fn remove_all(origin: Origin, before: &Values, mask: Mask, snow: &Probe<'_>, sca
         Probe::Tile { .. } => BlockEdit::Constant(origin, -scale.background),
     };
     let mut heights = [0.0; CELLS];
-    let were = voxel_fill::parts(before, scale.cell);
-    add_by_cell(&mut heights, |index| were[index]);
+    let fractions_before = voxel_fill::fractions(before, scale.cell);
+    add_by_cell(&mut heights, |index| fractions_before[index]);
     Edit {
         surface: BlockEdit::Constant(origin, scale.background),
         removed: Some(removed),
@@ -85,10 +85,11 @@ fn remove_part(origin: Origin, before: &Values, cells: &Values, scale: Scale) ->
     for index in 0..VOXELS {
         let (snow, sweep) = (before[index], cells[index] * scale.cell);
         let mut left = if -sweep > snow { (-sweep).min(scale.background) } else { snow };
-        // Coincident faces, such as those of a sole and the ground under it, leave a shell of zero thickness that the adjacent distances
-        // show as snow: move the value at least as far outside as the snow that is really left.
+        // Coincident faces, such as those of a sole and the ground under it, leave a shell of zero thickness whose values
+        // still count as partly filled: raise the value until the voxel holds no more snow than the difference of the two
+        // fractions.
         let is_thin = (0.0..0.5 * scale.cell).contains(&left) && sweep < 0.5 * scale.cell;
-        if is_thin && is_along(before, cells, index) {
+        if is_thin && faces_same_way(before, cells, index) {
             let rest = (filled(snow, scale.cell) - filled(sweep, scale.cell)).max(0.0);
             left = left.max((0.5 - rest) * scale.cell);
         }
@@ -100,8 +101,9 @@ fn remove_part(origin: Origin, before: &Values, cells: &Values, scale: Scale) ->
     if changed == [0; 8] {
         return None;
     }
-    let (were, are) = (voxel_fill::parts(before, scale.cell), voxel_fill::parts(&after, scale.cell));
-    add_by_cell(&mut heights, |index| were[index] - are[index]);
+    let (fractions_before, fractions_after) =
+        (voxel_fill::fractions(before, scale.cell), voxel_fill::fractions(&after, scale.cell));
+    add_by_cell(&mut heights, |index| fractions_before[index] - fractions_after[index]);
     let removed = pack(origin, removed, scale);
     let outside = matches!(removed, BlockEdit::Constant(_, value) if value > 0.0);
     Some(Edit {
@@ -113,12 +115,12 @@ fn remove_part(origin: Origin, before: &Values, cells: &Values, scale: Scale) ->
 }
 
 /// Minimum cosine of the angle between surfaces that face the same way.
-const ALONG: f32 = 0.9;
+const MIN_COSINE: f32 = 0.9;
 
 /// Whether the snow and a sweep face the same way at a voxel.
-fn is_along(snow: &Values, sweep: &Values, index: usize) -> bool {
+fn faces_same_way(snow: &Values, sweep: &Values, index: usize) -> bool {
     let (one, other) = (voxel_fill::direction(snow, index), voxel_fill::direction(sweep, index));
-    one.zip(other).is_some_and(|([a, b, c], [d, e, f])| a * d + b * e + c * f > ALONG)
+    one.zip(other).is_some_and(|([a, b, c], [d, e, f])| a * d + b * e + c * f > MIN_COSINE)
 }
 
 /// A block of a level set from distances in cells.
