@@ -3,7 +3,7 @@
 //!
 //! [`run`] runs any stage; [`snow`], [`surface`] and [`shallow`] have the inputs, the check and the stages of a system; the stage `objects`
 //! writes the objects as they move. A new stage is a type with the traits [`run::Stage`] and [`run::Stepping`] beside its system, listed in
-//! the system's plan ([`snow::plan`]) and in the scopes of the keys that it depends on.
+//! the system's pipeline ([`snow::pipeline`]) and in the scopes of the keys that it depends on.
 //!
 //! # Glossary
 //!

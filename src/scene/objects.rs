@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use super::run::{FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To};
+use super::run::{
+    DoneFrames, FileKind, FrameFiles, Reads, Report, Settings, Stage, StepTarget, Stepped, Stepping,
+};
 use super::{Role, Scene, moving};
 use crate::context::Context;
 use crate::error::Result;
@@ -20,7 +22,7 @@ use crate::sweep::Body;
 pub struct Objects<'a> {
     scene: &'a Scene,
     bodies: &'a [Body],
-    seen: &'a Arc<InputHashes>,
+    input_hashes: &'a Arc<InputHashes>,
     names: Vec<String>,
 }
 
@@ -32,8 +34,8 @@ pub struct Poses {
 
 impl<'a> Objects<'a> {
     /// The objects of a scene; `bodies` are in its order.
-    pub fn new(scene: &'a Scene, bodies: &'a [Body], seen: &'a Arc<InputHashes>) -> Self {
-        Self { scene, bodies, seen, names: moving::prim_names(scene) }
+    pub fn new(scene: &'a Scene, bodies: &'a [Body], input_hashes: &'a Arc<InputHashes>) -> Self {
+        Self { scene, bodies, input_hashes, names: moving::prim_names(scene) }
     }
 
     /// All objects in one mesh.
@@ -70,8 +72,8 @@ impl Stage for Objects<'_> {
         "objects"
     }
 
-    fn kinds(&self) -> &'static [Kind] {
-        &[Kind { name: "objects", extensions: &["usda", "ply"] }]
+    fn kinds(&self) -> &'static [FileKind] {
+        &[FileKind { name: "objects", extensions: &["usda", "ply"] }]
     }
 
     fn usd_kind(&self) -> Option<&'static str> {
@@ -79,10 +81,10 @@ impl Stage for Objects<'_> {
     }
 
     fn settings(&self) -> Result<Settings> {
-        settings_of(self.scene, self.name(), self.seen, &Role::MOVING)
+        settings_of(self.scene, self.name(), self.input_hashes, &Role::MOVING)
     }
 
-    fn remembers(&self) -> bool {
+    fn has_memory(&self) -> bool {
         false
     }
 
@@ -108,12 +110,12 @@ impl Stepping for Objects<'_> {
     type Step = Option<Poses>;
     type Writer = ();
 
-    fn load(&self, _ctx: &Context, _done: &Stored, _after: Option<i32>) -> Result<()> {
+    fn load(&self, _ctx: &Context, _done: &DoneFrames, _after: Option<i32>) -> Result<()> {
         Ok(())
     }
 
-    fn step(&self, ctx: &Context, _state: &mut (), to: &To<'_>) -> Result<Stepped<Option<Poses>>> {
-        let To { frame, made_from, .. } = *to;
+    fn step(&self, ctx: &Context, _state: &mut (), to: &StepTarget<'_>) -> Result<Stepped<Option<Poses>>> {
+        let StepTarget { frame, made_from, .. } = *to;
         let fps = self.scene.shot.fps;
         let mut meshes = Vec::with_capacity(self.bodies.len());
         let (mut pose, mut velocities) = (Vec::<DVec3>::new(), Vec::<DVec3>::new());
@@ -131,7 +133,7 @@ impl Stepping for Objects<'_> {
         Ok(())
     }
 
-    fn writes_alone(&self) -> bool {
+    fn writes_frames_independently(&self) -> bool {
         true
     }
 

@@ -11,7 +11,9 @@ use crate::program::{CUBE, Folder};
 use crate::turn;
 use frazil::io::records::manifest::Keeps;
 use frazil::scene::run::verify::verify;
-use frazil::scene::run::{FrameFiles, Kind, Report, Run, Settings, Stage, Stepped, Stepping, Stored, To};
+use frazil::scene::run::{
+    DoneFrames, FileKind, FrameFiles, Report, Run, Settings, Stage, StepTarget, Stepped, Stepping,
+};
 use frazil::scene::{FrameChoice, Inputs, Scene, snow};
 use frazil::{Context, Error, Pool, Result};
 
@@ -31,8 +33,8 @@ impl Stage for Tally {
         "tally"
     }
 
-    fn kinds(&self) -> &'static [Kind] {
-        &[Kind { name: "tally", extensions: &["txt"] }]
+    fn kinds(&self) -> &'static [FileKind] {
+        &[FileKind { name: "tally", extensions: &["txt"] }]
     }
 
     fn writes(&self, _kind: &str) -> bool {
@@ -47,7 +49,7 @@ impl Stage for Tally {
         Ok(Settings::from([("tally.weight".into(), self.weight.to_string())]))
     }
 
-    fn of_first_state(&self, _settings: &Settings) -> Settings {
+    fn first_state_settings(&self, _settings: &Settings) -> Settings {
         Settings::new()
     }
 
@@ -65,14 +67,14 @@ impl Stepping for Tally {
     type Step = u64;
     type Writer = ();
 
-    fn load(&self, _ctx: &Context, done: &Stored, after: Option<i32>) -> Result<u64> {
+    fn load(&self, _ctx: &Context, done: &DoneFrames, after: Option<i32>) -> Result<u64> {
         let Some(frame) = after else { return Ok(0) };
         let path = done.state_file(frame)?;
         let text = fs::read_to_string(&path).map_err(|error| Error::io(&path, "read", error))?;
         text.trim().parse().map_err(|_| Error::file(path, "is not a number"))
     }
 
-    fn step(&self, ctx: &Context, sum: &mut u64, to: &To<'_>) -> Result<Stepped<u64>> {
+    fn step(&self, ctx: &Context, sum: &mut u64, to: &StepTarget<'_>) -> Result<Stepped<u64>> {
         ctx.check()?;
         std::thread::sleep(self.wait);
         assert!(self.weight < TOO_HEAVY, "the scales broke");
@@ -117,15 +119,15 @@ fn run(folder: &Path, out: &str, asked: &Asked<'_>) -> Result<Vec<(&'static str,
     let seed = format!("snow.noise.seed={}", asked.seed).parse().unwrap();
     let scene = Scene::read_with(&folder.join("shot.toml"), &[seed])?;
     let inputs = Inputs::load(&scene)?;
-    let mut plan = snow::plan(&scene, &inputs);
+    let mut pipeline = snow::pipeline(&scene, &inputs);
     if asked.tallies {
-        plan.stages.push(Box::new(Tally { weight: asked.weight, wait: asked.wait }));
+        pipeline.stages.push(Box::new(Tally { weight: asked.weight, wait: asked.wait }));
     }
     let ctx = Context::new(Pool::new(1)?);
     let stages: Vec<String> = asked.stages.iter().map(|name| name.to_string()).collect();
     let frames: FrameChoice = asked.frames.parse().unwrap();
     let made = std::sync::Mutex::new(Vec::new());
-    let run = Run::prepare(&ctx, &plan, &folder.join(out), &stages, &frames, asked.from)?;
+    let run = Run::prepare(&ctx, &pipeline, &folder.join(out), &stages, &frames, asked.from)?;
     run.make(&ctx, |stage, frame, _| made.lock().unwrap().push((stage, frame)))?;
     Ok(made.into_inner().unwrap())
 }

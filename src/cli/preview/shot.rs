@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::grids::of_vdb;
 use super::parts::{Folder, Part, points_of};
 use frazil::io::mesh::{self, extension};
-use frazil::scene::run::Stored;
+use frazil::scene::run::DoneFrames;
 use frazil::scene::{Rebuild, RebuildGrains, Scene};
 use frazil::vdb::{FloatGrid, file};
 use frazil::{Context, Error, Result};
@@ -16,9 +16,9 @@ pub struct Shot {
     folder: PathBuf,
     base: Rebuild,
     grains: RebuildGrains,
-    mist: Stored,
-    objects: Stored,
-    surface: Stored,
+    mist: DoneFrames,
+    objects: DoneFrames,
+    surface: DoneFrames,
     files: [Files; 5],
     /// The frames that all stages have, ascending; at least one.
     frames: Vec<i32>,
@@ -43,7 +43,7 @@ impl Shot {
     /// Records that cannot be read; no stage that can be drawn.
     pub fn open(folder: &Path) -> Result<Self> {
         let (base, grains) = (Rebuild::open(folder)?, RebuildGrains::open(folder)?);
-        let stored = |stage: usize| Stored::read(folder, STAGES[stage].0);
+        let stored = |stage: usize| DoneFrames::read(folder, STAGES[stage].0);
         let (mist, objects, surface) = (stored(2)?, stored(3)?, stored(4)?);
         let stored = [base.stored(), grains.stored(), &mist, &objects, &surface];
         let files = [0, 1, 2, 3, 4].map(|stage| files_of(folder, stored[stage], STAGES[stage]));
@@ -125,7 +125,7 @@ impl Folder for Shot {
 }
 
 /// The files of a stage to draw; a warning if it has none of a readable kind.
-fn files_of(folder: &Path, stored: &Stored, (stage, extensions): (&str, &[&str])) -> Files {
+fn files_of(folder: &Path, stored: &DoneFrames, (stage, extensions): (&str, &[&str])) -> Files {
     let all = stored.files(stage);
     let mut files = Files::new();
     for (frame, path) in extensions

@@ -6,8 +6,8 @@ use crate::cli::preview::parts::{Folder, Part, Wet};
 use frazil::geometry::TriMesh;
 use frazil::io::mesh;
 use frazil::scene::Scene;
-use frazil::scene::run::Stored;
-use frazil::scene::shallow::Around;
+use frazil::scene::run::DoneFrames;
+use frazil::scene::shallow::Surroundings;
 use frazil::{Context, Error, Result};
 
 /// The stage, and the kind of its files.
@@ -18,7 +18,7 @@ const TERRAIN: &str = "terrain";
 /// An output folder of `frazil shallow`, read frame by frame.
 pub struct Spill {
     folder: PathBuf,
-    liquid: Stored,
+    liquid: DoneFrames,
     /// The scene; none if it cannot be read: the liquid is then drawn alone.
     scene: Option<Scene>,
     /// The terrain, if it is the same in all frames and was read.
@@ -33,7 +33,7 @@ impl Spill {
     /// # Errors
     /// Records that cannot be read.
     pub fn open(folder: &Path) -> Result<Option<Self>> {
-        let liquid = Stored::read(folder, LIQUID)?;
+        let liquid = DoneFrames::read(folder, LIQUID)?;
         let all = liquid.files(LIQUID);
         let frames: Vec<i32> =
             all.into_iter().filter(|(_, path)| path.ends_with(".ply")).map(|(frame, _)| frame).collect();
@@ -54,12 +54,12 @@ impl Spill {
     fn around(&mut self, ctx: &Context, frame: i32, look: Wet) -> Vec<Part> {
         let Some(scene) = &self.scene else { return Vec::new() };
         let around = match self.terrain.clone() {
-            Some(terrain) => Around::with_terrain(terrain, scene, frame),
-            None => Around::read(ctx, scene, frame),
+            Some(terrain) => Surroundings::with_terrain(terrain, scene, frame),
+            None => Surroundings::read(ctx, scene, frame),
         };
         match around {
-            Ok(Around { terrain, mut obstacles, meshes }) => {
-                if !Around::moves(scene) {
+            Ok(Surroundings { terrain, mut obstacles, meshes }) => {
+                if !Surroundings::moves(scene) {
                     self.terrain = Some(terrain.clone());
                 }
                 let tools = obstacles.split_off(meshes).into_iter().map(Part::Obstacle);

@@ -10,7 +10,7 @@ pub(in crate::cli) mod surface;
 use std::path::PathBuf;
 use std::sync::Mutex;
 
-use frazil::scene::run::{Plan, Report, Run};
+use frazil::scene::run::{Pipeline, Report, Run};
 use frazil::scene::{FrameChoice, Override, Scene};
 
 use super::output;
@@ -52,16 +52,16 @@ impl ShotArgs {
         Ok(frames)
     }
 
-    /// Makes the frames of a plan; `seen` is called with the report of each, by one thread at a time.
+    /// Makes the frames of a pipeline; `seen` is called with the report of each, by one thread at a time.
     pub fn make(
         &self,
         session: &Session,
-        plan: &Plan<'_>,
+        pipeline: &Pipeline<'_>,
         stages: &[String],
         frames: &FrameChoice,
         seen: impl FnMut(&Report) + Send,
     ) -> Result<(), Failure> {
-        let run = Run::prepare(&session.ctx, plan, &self.output, stages, frames, self.from).before()?;
+        let run = Run::prepare(&session.ctx, pipeline, &self.output, stages, frames, self.from).before()?;
         output::check_folder(&self.output).before()?;
         let (made, there) = (run.to_make(), run.there());
         let shown = Mutex::new((FrameProgress::new(&session.ctx, made, there, session.is_quiet()), seen));

@@ -34,9 +34,9 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let frames = args.shot.frames(&scene)?;
     session.ctx.set_memory_limit(session.max_memory());
     let inputs = shallow::Inputs::load(&session.ctx, &scene).before()?;
-    let plan = shallow::plan(&session.ctx, &scene, &inputs).before()?;
+    let pipeline = shallow::pipeline(&session.ctx, &scene, &inputs).before()?;
     let (mut times, mut last) = (Times::default(), None);
-    args.shot.make(session, &plan, &[], &frames, |report| {
+    args.shot.make(session, &pipeline, &[], &frames, |report| {
         times.add(report);
         last = Some(report.results.clone());
     })?;

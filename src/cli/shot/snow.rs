@@ -42,9 +42,9 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     session.ctx.set_memory_limit(session.max_memory());
     let inputs = Inputs::load(&scene).before()?;
     check_memory(&scene, &inputs, session.max_memory()).before()?;
-    let plan = snow::plan(&scene, &inputs);
+    let pipeline = snow::pipeline(&scene, &inputs);
     let mut removed = 0.0;
-    args.shot.make(session, &plan, &args.stage, &frames, |report| {
+    args.shot.make(session, &pipeline, &args.stage, &frames, |report| {
         let of_frame = report.results.get("removed_m3").and_then(|value| value.as_f64());
         removed += of_frame.unwrap_or(0.0);
     })?;

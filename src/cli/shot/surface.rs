@@ -45,9 +45,9 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let frames = args.shot.frames(&scene)?;
     session.ctx.set_memory_limit(session.max_memory());
     let inputs = surface::Inputs::load(&session.ctx, &scene).before()?;
-    let plan = surface::plan(&scene, &inputs).before()?;
+    let pipeline = surface::pipeline(&scene, &inputs).before()?;
     let mut flagged = 0;
-    args.shot.make(session, &plan, &[], &frames, |report| {
+    args.shot.make(session, &pipeline, &[], &frames, |report| {
         let of_frame = report.results.get("flagged").and_then(|value| value.as_u64());
         flagged = flagged.max(of_frame.unwrap_or(0));
     })?;

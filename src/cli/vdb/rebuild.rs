@@ -7,7 +7,7 @@ use crate::cli::options::{of_frame, refuse_one_file};
 use crate::cli::output;
 use crate::cli::session::{Failure, Phase, Session};
 use frazil::io::files::atomic;
-use frazil::scene::run::Stored;
+use frazil::scene::run::DoneFrames;
 use frazil::scene::{FrameChoice, Rebuild, RebuildGrains};
 use frazil::vdb::MetaValue;
 use frazil::vdb::file::{self, WriteOptions};
@@ -76,7 +76,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 impl Args {
     /// Refuses frames that a cache lacks, and an output among its own files.
-    fn check(&self, stored: &Stored) -> Result<(), Failure> {
+    fn check(&self, stored: &DoneFrames) -> Result<(), Failure> {
         if let Some(missing) = self.frame.iter().find(|frame| !stored.is_done(*frame)) {
             return Err(Failure::of_file(&self.folder, format!("frame {missing} is not there")));
         }

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::chain::{Chain, Made};
+use super::done_frames::{DoneFrames, Resumable};
 use super::settings::{self, Settings};
 use super::stage::Stage;
-use super::stored::{Kept, Stored};
 use crate::error::{Error, Result};
 use crate::io::files::hash::Hasher;
 use crate::io::records::checksummed;
@@ -59,8 +59,8 @@ pub struct Asked<'a> {
 
 impl Asked<'_> {
     /// The request for a stage: one that was never made and whose frames are independent makes all wanted frames.
-    fn of(self, stage: &dyn Stage, stored: &Stored) -> Self {
-        let is_new = !stage.remembers() && stored.frames().next().is_none();
+    fn of(self, stage: &dyn Stage, stored: &DoneFrames) -> Self {
+        let is_new = !stage.has_memory() && stored.frames().next().is_none();
         Self { from: self.from.filter(|_| !is_new), ..self }
     }
 }
@@ -68,7 +68,7 @@ impl Asked<'_> {
 /// The frames of a stage; only one run holds them at a time.
 pub struct Cache {
     /// The frames that are done, except those to be made again.
-    pub stored: Stored,
+    pub stored: DoneFrames,
     record: Record,
     chain: Chain,
     /// Frames to be made again, removed by [`Cache::commit`].
@@ -81,11 +81,16 @@ impl Cache {
     /// # Errors
     /// A folder that cannot be read or that holds frames of other settings; a damaged record; no frame to resume from; a gap between
     /// frames, if the stage allows none.
-    pub fn open(stage: &dyn Stage, seen: &Arc<InputHashes>, folder: &Path, asked: Asked<'_>) -> Result<Self> {
+    pub fn open(
+        stage: &dyn Stage,
+        input_hashes: &Arc<InputHashes>,
+        folder: &Path,
+        asked: Asked<'_>,
+    ) -> Result<Self> {
         let settings = stage.settings()?;
         let path = record_path(folder, stage);
         let mut record: Record = checksummed::read(&path)?.unwrap_or_default();
-        let mut stored = Stored::read(folder, stage.name())?;
+        let mut stored = DoneFrames::read(folder, stage.name())?;
         refuse_asked(stage, asked, &stored)?;
         let Asked { first, frames, from } = asked.of(stage, &stored);
         let mut forgotten = Vec::new();
@@ -131,7 +136,7 @@ impl Cache {
             );
             return Err(Error::file(folder, what));
         }
-        let chain = Chain::new(seen, last.from, &last.seed);
+        let chain = Chain::new(input_hashes, last.from, &last.seed);
         Ok(Self { stored, record, chain, forgotten })
     }
 
@@ -142,12 +147,12 @@ impl Cache {
     /// The changed settings, or the frame whose inputs have changed; a damaged record; an input that cannot be read.
     pub fn refuse_stale(
         stage: &dyn Stage,
-        seen: &Arc<InputHashes>,
+        input_hashes: &Arc<InputHashes>,
         folder: &Path,
         reader: &str,
-        upstream: &[Stored],
+        upstream: &[DoneFrames],
     ) -> Result<()> {
-        let stored = Stored::read(folder, stage.name())?;
+        let stored = DoneFrames::read(folder, stage.name())?;
         let record: Record = checksummed::read(&record_path(folder, stage))?.unwrap_or_default();
         // Missing frames are reported elsewhere.
         let Some(last) = record.segments.last().filter(|_| stored.frames().next().is_some()) else {
@@ -157,7 +162,7 @@ impl Cache {
         if !changed.is_empty() {
             return Err(stale(stage, folder, reader, &format!("other settings ({})", changed.join(", "))));
         }
-        let chain = Chain::new(seen, last.from, &last.seed);
+        let chain = Chain::new(input_hashes, last.from, &last.seed);
         let mut cache = Self { stored, record, chain, forgotten: Vec::new() };
         match cache.first_changed(stage, &FrameChoice::none(), upstream)? {
             None => Ok(()),
@@ -189,8 +194,8 @@ impl Cache {
     }
 
     /// What the stage can resume from in a shot that begins at frame `first`.
-    pub fn kept(&self, first: i32) -> Kept<'_> {
-        Kept { first, own_from: self.own_from(), done: &self.stored }
+    pub fn kept(&self, first: i32) -> Resumable<'_> {
+        Resumable { first, own_from: self.own_from(), done: &self.stored }
     }
 
     /// Refuses frames whose inputs have changed since. A frame whose files of the coming frame have changed or appeared is made again if it
@@ -202,7 +207,7 @@ impl Cache {
         &mut self,
         stage: &dyn Stage,
         asked: &FrameChoice,
-        upstream: &[Stored],
+        upstream: &[DoneFrames],
     ) -> Result<()> {
         let Some(frame) = self.first_changed(stage, asked, upstream)? else { return Ok(()) };
         let what = format!(
@@ -218,7 +223,7 @@ impl Cache {
         &mut self,
         stage: &dyn Stage,
         asked: &FrameChoice,
-        upstream: &[Stored],
+        upstream: &[DoneFrames],
     ) -> Result<Option<i32>> {
         let own = self.own_from();
         // An upstream frame that is not done may still be made in this run, and is checked then; or it is gone, and there is nothing to
@@ -242,7 +247,7 @@ impl Cache {
     ///
     /// # Errors
     /// A file that cannot be read.
-    pub fn inputs(&mut self, stage: &dyn Stage, frame: i32, upstream: &[Stored]) -> Result<Made> {
+    pub fn inputs(&mut self, stage: &dyn Stage, frame: i32, upstream: &[DoneFrames]) -> Result<Made> {
         self.chain.at(stage, frame, &self.stored, upstream)
     }
 }
@@ -256,7 +261,8 @@ fn refuse_other_start(
     settings: &Settings,
 ) -> Result<()> {
     let Some(kept) = record.segments.iter().rev().find(|segment| segment.from < from) else { return Ok(()) };
-    let changed = settings::changed(&stage.of_first_state(&kept.settings), &stage.of_first_state(settings));
+    let changed =
+        settings::changed(&stage.first_state_settings(&kept.settings), &stage.first_state_settings(settings));
     if changed.is_empty() {
         return Ok(());
     }
@@ -273,7 +279,7 @@ fn refuse_other_start(
 ///
 /// # Errors
 /// The reason.
-pub(super) fn refuse_asked(stage: &dyn Stage, asked: Asked<'_>, stored: &Stored) -> Result<()> {
+pub(super) fn refuse_asked(stage: &dyn Stage, asked: Asked<'_>, stored: &DoneFrames) -> Result<()> {
     let Asked { first, frames, from } = asked.of(stage, stored);
     if let Some(from) = from {
         refuse_from(stage, frames, first, from, stored)?;
@@ -294,7 +300,7 @@ fn refuse_from(
     frames: &FrameChoice,
     first: i32,
     from: i32,
-    stored: &Stored,
+    stored: &DoneFrames,
 ) -> Result<()> {
     let refused = |what: String| Err(Error::file(stored.folder(), what));
     if frames.last() < from {
@@ -307,10 +313,10 @@ fn refuse_from(
         return Ok(());
     }
     let before = from - 1;
-    if stage.remembers() && !stored.is_done(before) {
+    if stage.has_memory() && !stored.is_done(before) {
         return refused(format!("--from {from} needs frame {before}, which is not there"));
     }
-    if stage.remembers() && stored.latest_state(before..=before).is_none() {
+    if stage.has_memory() && stored.latest_state(before..=before).is_none() {
         let kept: Vec<String> = stored
             .frames()
             .filter(|frame| *frame < frames.last() && stored.latest_state(*frame..=*frame).is_some())
@@ -321,7 +327,7 @@ fn refuse_from(
             "--from {from} needs the exact {} after frame {before}, which the folder does not keep ({}): \
              {ways}--from {first} or another -o",
             stage.noun(),
-            stage.why_states_go()
+            stage.why_states_are_missing()
         ));
     }
     match frames.iter().find(|frame| *frame < from && !stored.is_done(*frame)) {

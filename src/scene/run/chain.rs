@@ -4,8 +4,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::done_frames::DoneFrames;
 use super::stage::Stage;
-use super::stored::Stored;
 use crate::error::{Error, Result};
 use crate::io::files::hash::Hasher;
 use crate::io::records::input_hashes::InputHashes;
@@ -16,7 +16,7 @@ pub(super) struct Chain {
     first: i32,
     /// The hash of the start, then that of each frame requested so far.
     links: Vec<String>,
-    seen: Arc<InputHashes>,
+    input_hashes: Arc<InputHashes>,
 }
 
 /// Hashes of a frame's inputs.
@@ -30,10 +30,10 @@ pub struct Made {
 
 impl Chain {
     /// A chain whose first link is for frame `first` and depends on `seed`.
-    pub fn new(seen: &Arc<InputHashes>, first: i32, seed: &str) -> Self {
+    pub fn new(input_hashes: &Arc<InputHashes>, first: i32, seed: &str) -> Self {
         let mut start = Hasher::default();
         start.add_text(seed).add(&first.to_le_bytes());
-        Self { first, links: vec![start.finish()], seen: seen.clone() }
+        Self { first, links: vec![start.finish()], input_hashes: input_hashes.clone() }
     }
 
     /// The inputs of a frame; a frame before the first depends on the seed alone. If an upstream frame no longer exists, the stage's own
@@ -41,8 +41,14 @@ impl Chain {
     ///
     /// # Errors
     /// A file that cannot be read; a frame that is neither done nor has all its inputs.
-    pub fn at(&mut self, stage: &dyn Stage, frame: i32, own: &Stored, upstream: &[Stored]) -> Result<Made> {
-        let from = if stage.remembers() {
+    pub fn at(
+        &mut self,
+        stage: &dyn Stage,
+        frame: i32,
+        own: &DoneFrames,
+        upstream: &[DoneFrames],
+    ) -> Result<Made> {
+        let from = if stage.has_memory() {
             let wanted = (i64::from(frame) - i64::from(self.first)).max(-1) + 1;
             while (self.links.len() as i64) <= wanted {
                 let next = self.first + (self.links.len() - 1) as i32;
@@ -61,8 +67,8 @@ impl Chain {
         before: &str,
         stage: &dyn Stage,
         frame: i32,
-        own: &Stored,
-        upstream: &[Stored],
+        own: &DoneFrames,
+        upstream: &[DoneFrames],
     ) -> Result<String> {
         let mut link = Hasher::default();
         link.add_text(before);
@@ -72,7 +78,7 @@ impl Chain {
                 return recorded.ok_or_else(|| missing(stage, frame, name, stored.folder()));
             };
             // The meaning of a file of changes depends on the frames before it; stages with memory already have links for those.
-            if !stage.remembers() {
+            if !stage.has_memory() {
                 link.add_text(&manifest.inputs);
             }
             manifest.files.iter().chain(&manifest.state).for_each(|file| {
@@ -80,7 +86,7 @@ impl Chain {
             });
         }
         for file in &stage.reads(frame).files {
-            link.add_text(&self.seen.hash(file)?);
+            link.add_text(&self.input_hashes.hash(file)?);
         }
         Ok(link.finish())
     }
@@ -91,7 +97,7 @@ impl Chain {
         }
         let mut hasher = Hasher::default();
         for file in files {
-            let hash = if file.is_file() { self.seen.hash(file)? } else { String::new() };
+            let hash = if file.is_file() { self.input_hashes.hash(file)? } else { String::new() };
             hasher.add_text(&hash);
         }
         Ok(Some(hasher.finish()))

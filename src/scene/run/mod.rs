@@ -2,27 +2,27 @@
 //!
 //! A shot is made by stages ([`Stage`]), one pass over the frames each. Every stage has its own records, so that it is made again only if
 //! something that it depends on has changed: its settings (`settings.rs`), the files that a frame reads and the frames of stages upstream
-//! of it (`chain.rs`). A frame is done when its record exists ([`Stored`]); `cache.rs` knows which frames belong to which settings,
+//! of it (`chain.rs`). A frame is done when its record exists ([`DoneFrames`]); `cache.rs` knows which frames belong to which settings,
 //! `run/own_files.rs` which files of the folder are its own. `runner.rs` drives everything; [`verify`] compares a folder with its records,
 //! `usd.rs` describes the shot to other programs.
 
 mod cache;
 mod chain;
+mod done_frames;
 mod own_files;
 mod pass;
-mod plan;
+mod pipeline;
 mod runner;
 pub(in crate::scene) mod settings;
 mod stage;
-mod stored;
 mod usd;
 pub mod verify;
 
+pub use done_frames::DoneFrames;
 pub use pass::AnyStage;
-pub use plan::Plan;
+pub use pipeline::Pipeline;
 pub use runner::Run;
 #[cfg(test)]
 pub(in crate::scene) use settings::changed;
 pub use settings::{CONTENT, Settings};
-pub use stage::{FrameFiles, Kind, Reads, Report, Stage, Stepped, Stepping, To, Volume};
-pub use stored::Stored;
+pub use stage::{FileKind, FrameFiles, Reads, Report, Stage, StepTarget, Stepped, Stepping, Volume};

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::plan::Plan;
+use super::done_frames::{names_in, record_of};
+use super::pipeline::Pipeline;
 use super::stage::Stage;
-use super::stored::{names_in, record_of};
 use crate::error::{Error, Result};
 use crate::io::files::{atomic, hash};
 use crate::io::records::checksummed;
@@ -94,14 +94,14 @@ impl Own {
     ///
     /// # Errors
     /// The file that would be overwritten.
-    pub fn refuse_foreign(&self, plan: &Plan, frames: &FrameChoice) -> Result<()> {
-        for input in plan.scene.files() {
+    pub fn refuse_foreign(&self, pipeline: &Pipeline, frames: &FrameChoice) -> Result<()> {
+        for input in pipeline.scene.files() {
             if input.parent().is_some_and(|folder| self.holds(folder, &input)) {
                 let what = "is an input of the scene and would be written over: choose another -o";
                 return Err(Error::file(input, what));
             }
         }
-        let scene = plan.scene;
+        let scene = pipeline.scene;
         let new = hash::of_bytes(scene.to_toml_in(&self.folder).as_bytes());
         if is_same(&scene.path, &self.folder.join(SCENE)) && hash::of_file(&scene.path)? != new {
             let what = "is the scene that is read and would be written over: choose another -o";
@@ -109,7 +109,7 @@ impl Own {
         }
         if scene.output.usd {
             self.refuse_changed(SHOT, None)?;
-            let kinds = plan.stages().filter_map(|stage| stage.usd_kind());
+            let kinds = pipeline.stages().filter_map(|stage| stage.usd_kind());
             kinds.map(manifest_of).try_for_each(|name| self.refuse_changed(&name, None))?;
         }
         self.refuse_changed(SCENE, Some(&new))?;

@@ -9,8 +9,8 @@ use serde_json::json;
 
 use super::cache::Cache;
 use super::chain::Made;
-use super::stage::{FrameFiles, Report, Stage, Stepped, Stepping, To};
-use super::stored::{Kept, Stored};
+use super::done_frames::{DoneFrames, Resumable};
+use super::stage::{FrameFiles, Report, Stage, StepTarget, Stepped, Stepping};
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
 use crate::io::files::atomic;
@@ -42,21 +42,21 @@ pub struct Shared<'a> {
 
 /// A stage of any type, with the pass that makes its frames.
 pub trait AnyStage: Stage {
-    /// See [`Stepping::foresee`].
+    /// See [`Stepping::precheck`].
     #[doc(hidden)]
-    fn looks_ahead(&self, ctx: &Context, upstream: &[Stored], last: i32) -> Result<()>;
+    fn precheck_frames(&self, ctx: &Context, upstream: &[DoneFrames], last: i32) -> Result<()>;
 
     /// The state from which a frame is reached in the fewest steps.
     #[doc(hidden)]
-    fn before<'a>(&'a self, ctx: &Context, frame: i32, kept: Kept<'_>) -> Result<Box<dyn Pass + 'a>>;
+    fn before<'a>(&'a self, ctx: &Context, frame: i32, kept: Resumable<'_>) -> Result<Box<dyn Pass + 'a>>;
 }
 
 impl<S: Stepping> AnyStage for S {
-    fn looks_ahead(&self, ctx: &Context, upstream: &[Stored], last: i32) -> Result<()> {
-        self.foresee(ctx, upstream, last)
+    fn precheck_frames(&self, ctx: &Context, upstream: &[DoneFrames], last: i32) -> Result<()> {
+        self.precheck(ctx, upstream, last)
     }
 
-    fn before<'a>(&'a self, ctx: &Context, frame: i32, kept: Kept<'_>) -> Result<Box<dyn Pass + 'a>> {
+    fn before<'a>(&'a self, ctx: &Context, frame: i32, kept: Resumable<'_>) -> Result<Box<dyn Pass + 'a>> {
         Ok(Box::new(At::before(self, ctx, frame, kept)?))
     }
 }
@@ -75,7 +75,7 @@ pub struct Work<'a> {
     /// Gets the records of the frames that were written, even if the pass fails.
     pub cache: &'a mut Cache,
     /// The frames of the stages upstream.
-    pub upstream: &'a [Stored],
+    pub upstream: &'a [DoneFrames],
     /// The frames to make, ascending.
     pub todo: &'a [i32],
     /// Whether the exact states of all frames are kept, as another stage reads them.
@@ -105,9 +105,9 @@ struct Frame<T> {
 }
 
 impl<'a, S: Stepping> At<'a, S> {
-    fn before(stage: &'a S, ctx: &Context, frame: i32, kept: Kept<'_>) -> Result<Self> {
-        let Kept { first, own_from, done } = kept;
-        if !stage.remembers() {
+    fn before(stage: &'a S, ctx: &Context, frame: i32, kept: Resumable<'_>) -> Result<Self> {
+        let Resumable { first, own_from, done } = kept;
+        if !stage.has_memory() {
             return Ok(Self { stage, frame: frame - 1, state: stage.load(ctx, done, None)? });
         }
         let latest = done.latest_state(first..=frame - 1);
@@ -129,7 +129,7 @@ impl<'a, S: Stepping> At<'a, S> {
         let mut follows = false;
         for &wanted in todo {
             let is_nearer = || cache.stored.latest_state(self.frame + 1..=wanted - 1).is_some();
-            if self.frame < wanted - 1 && (!stage.remembers() || is_nearer()) {
+            if self.frame < wanted - 1 && (!stage.has_memory() || is_nearer()) {
                 self = Self::before(stage, ctx, wanted, cache.kept(shared.first))?;
                 follows = false;
             }
@@ -144,7 +144,7 @@ impl<'a, S: Stepping> At<'a, S> {
                 follows = true;
                 let made = if frame == wanted { Some(cache.inputs(stage, frame, upstream)?) } else { None };
                 let made_from = made.as_ref().map(|made| &made.from[..]);
-                let stepped = stage.step(ctx, &mut self.state, &To { frame, made_from, upstream })?;
+                let stepped = stage.step(ctx, &mut self.state, &StepTarget { frame, made_from, upstream })?;
                 self.frame = frame;
                 if !send(Job::Step(Box::new(Frame { frame, made, stepped }))) {
                     return Ok(());
@@ -191,7 +191,7 @@ impl<S: Stepping> Files<'_, S> {
         let mut writer = None;
         // The first error, and the number of consecutive frames that could not be written.
         let (mut failed, mut on_end): (Option<Error>, usize) = (None, 0);
-        let goes_on = self.stage.writes_alone() && self.stage.needs_every_frame().is_none();
+        let goes_on = self.stage.writes_frames_independently() && self.stage.needs_every_frame().is_none();
         for job in waiting {
             let frame = match job {
                 Job::Start(start) => {

@@ -7,11 +7,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::ScopedJoinHandle;
 
 use super::cache::{Asked, Cache, refuse_asked};
+use super::done_frames::DoneFrames;
 use super::own_files::Own;
 use super::pass::{AnyStage, Pass, Shared, Work};
-use super::plan::Plan;
+use super::pipeline::Pipeline;
 use super::stage::{Report, Stage};
-use super::stored::Stored;
 use super::{chain, own_files, usd};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -20,7 +20,7 @@ use crate::scene::FrameChoice;
 
 /// A shot with its folder, ready to run.
 pub struct Run<'a> {
-    plan: &'a Plan<'a>,
+    pipeline: &'a Pipeline<'a>,
     /// All stages, including those that are not to be made.
     stages: Vec<StageRun<'a>>,
     own: Own,
@@ -55,30 +55,30 @@ impl<'a> Run<'a> {
     /// record or frame; a gap between frames, if a stage allows none. Nothing is then changed.
     pub fn prepare(
         ctx: &Context,
-        plan: &'a Plan<'a>,
+        pipeline: &'a Pipeline<'a>,
         folder: &Path,
         only: &[String],
         frames: &FrameChoice,
         from: Option<i32>,
     ) -> Result<Self> {
-        let chosen = plan.chosen(only)?;
-        let asked = Asked { first: plan.scene.shot.frames.first, frames, from };
+        let chosen = pipeline.chosen(only)?;
+        let asked = Asked { first: pipeline.scene.shot.frames.first, frames, from };
         // A refused run leaves no folder behind; changes by another run meanwhile are checked again below.
-        let of_run = || chosen.iter().map(|position| &*plan.stages[*position] as &dyn Stage);
+        let of_run = || chosen.iter().map(|position| &*pipeline.stages[*position] as &dyn Stage);
         for stage in of_run() {
-            refuse_asked(stage, asked, &Stored::read(folder, stage.name())?)?;
+            refuse_asked(stage, asked, &DoneFrames::read(folder, stage.name())?)?;
         }
-        Own::read(folder, of_run())?.refuse_foreign(plan, frames)?;
-        plan.refuse_stale(&chosen, folder)?;
+        Own::read(folder, of_run())?.refuse_foreign(pipeline, frames)?;
+        pipeline.refuse_stale(&chosen, folder)?;
         make_folders(of_run(), folder)?;
         let lock = lock(folder)?;
         let own = Own::read(folder, of_run())?;
         own.remove_unfinished()?;
-        own.refuse_foreign(plan, frames)?;
-        plan.refuse_stale(&chosen, folder)?;
-        let mut run = Self { plan, stages: Vec::new(), own, _lock: lock };
-        let downstream = if from.is_some() { plan.downstream(&chosen) } else { Vec::new() };
-        for (position, stage) in plan.stages.iter().enumerate() {
+        own.refuse_foreign(pipeline, frames)?;
+        pipeline.refuse_stale(&chosen, folder)?;
+        let mut run = Self { pipeline, stages: Vec::new(), own, _lock: lock };
+        let downstream = if from.is_some() { pipeline.downstream(&chosen) } else { Vec::new() };
+        for (position, stage) in pipeline.stages.iter().enumerate() {
             let is_chosen = chosen.contains(&position);
             let from = asked.from.filter(|_| !is_chosen && downstream.contains(&position));
             let own_stage = run.open(&**stage, folder, asked, is_chosen, from)?;
@@ -103,11 +103,11 @@ impl<'a> Run<'a> {
             StageRun { stage, cache: None, todo: Vec::new(), there: 0, start: None, forgotten: Vec::new() };
         if !is_chosen {
             if let Some(from) = forget_from {
-                run.forgotten = Stored::read(folder, stage.name())?.leave_out_from(from);
+                run.forgotten = DoneFrames::read(folder, stage.name())?.leave_out_from(from);
             }
             return Ok(run);
         }
-        let mut cache = Cache::open(stage, self.plan.seen, folder, asked)?;
+        let mut cache = Cache::open(stage, self.pipeline.input_hashes, folder, asked)?;
         let upstream = self.upstream(stage, folder)?;
         cache.check_inputs(stage, asked.frames, &upstream)?;
         let (there, todo): (Vec<i32>, Vec<i32>) =
@@ -122,11 +122,11 @@ impl<'a> Run<'a> {
     fn refuse_missing(
         &self,
         stage: &dyn Stage,
-        own: &Stored,
+        own: &DoneFrames,
         todo: &[i32],
-        upstream: &[Stored],
+        upstream: &[DoneFrames],
     ) -> Result<()> {
-        let first = self.plan.scene.shot.frames.first;
+        let first = self.pipeline.scene.shot.frames.first;
         for (name, stored) in stage.upstream().iter().zip(upstream) {
             let made = self.stages.iter().find(|run| run.stage.name() == *name).map(|run| &run.todo[..]);
             let is_there = |frame: &i32| {
@@ -135,7 +135,7 @@ impl<'a> Run<'a> {
             let mut at = first - 1;
             for &wanted in todo {
                 let from = own.latest_state(at + 1..=wanted - 1).unwrap_or(at);
-                let begin = if stage.remembers() { from + 1 } else { wanted };
+                let begin = if stage.has_memory() { from + 1 } else { wanted };
                 if let Some(frame) = (begin..=wanted).find(|frame| !is_there(frame)) {
                     return Err(chain::missing(stage, frame, name, stored.folder()));
                 }
@@ -147,9 +147,9 @@ impl<'a> Run<'a> {
 
     /// The existing frames of a stage's upstream stages, in the order in which the stage lists them, except frames that this run will make
     /// again.
-    fn upstream(&self, stage: &dyn Stage, folder: &Path) -> Result<Vec<Stored>> {
+    fn upstream(&self, stage: &dyn Stage, folder: &Path) -> Result<Vec<DoneFrames>> {
         let of = |name: &&str| {
-            let mut stored = Stored::read(folder, name)?;
+            let mut stored = DoneFrames::read(folder, name)?;
             if let Some(run) = self.stages.iter().find(|run| run.stage.name() == *name) {
                 run.todo.iter().for_each(|frame| stored.leave_out(*frame));
             }
@@ -160,13 +160,13 @@ impl<'a> Run<'a> {
 
     /// Loads the state before the first frame to be made, for stages whose upstream frames all exist.
     fn load(&mut self, ctx: &Context) -> Result<()> {
-        let first = self.plan.scene.shot.frames.first;
+        let first = self.pipeline.scene.shot.frames.first;
         for position in 0..self.stages.len() {
             let run = &self.stages[position];
             if let ([frame, ..], Some(cache), false) = (&run.todo[..], &run.cache, self.waits(run)) {
                 let upstream = self.upstream(run.stage, self.own.folder())?;
                 let last = run.todo.last().copied().unwrap_or(*frame);
-                run.stage.looks_ahead(ctx, &upstream, last)?;
+                run.stage.precheck_frames(ctx, &upstream, last)?;
                 self.stages[position].start = Some(run.stage.before(ctx, *frame, cache.kept(first))?);
             }
         }
@@ -177,7 +177,7 @@ impl<'a> Run<'a> {
     /// the folder.
     fn commit(&mut self) -> Result<()> {
         for run in self.stages.iter_mut().rev() {
-            let stored = Stored::read(self.own.folder(), run.stage.name())?;
+            let stored = DoneFrames::read(self.own.folder(), run.stage.name())?;
             run.forgotten.drain(..).try_for_each(|manifest| stored.remove(&manifest))?;
             if let [first, .., last] | [first @ last] = run.todo[..] {
                 self.own.begin(run.stage.name(), first, last)?;
@@ -186,7 +186,7 @@ impl<'a> Run<'a> {
                 cache.commit(run.stage)?;
             }
         }
-        self.own.write(own_files::SCENE, self.plan.scene.to_toml_in(self.own.folder()).as_bytes())
+        self.own.write(own_files::SCENE, self.pipeline.scene.to_toml_in(self.own.folder()).as_bytes())
     }
 
     /// Whether a stage upstream of this one still has frames to make.
@@ -228,11 +228,14 @@ impl<'a> Run<'a> {
         if let Some(error) = failed {
             return Err(error);
         }
-        if self.plan.scene.output.usd {
+        if self.pipeline.scene.output.usd {
             let folder = self.own.folder().to_path_buf();
-            let stored: Vec<Stored> =
-                self.plan.stages().map(|stage| Stored::read(&folder, stage.name())).collect::<Result<_>>()?;
-            usd::write(self.plan, self.plan.stages().zip(&stored), &mut self.own)?;
+            let stored: Vec<DoneFrames> = self
+                .pipeline
+                .stages()
+                .map(|stage| DoneFrames::read(&folder, stage.name()))
+                .collect::<Result<_>>()?;
+            usd::write(self.pipeline, self.pipeline.stages().zip(&stored), &mut self.own)?;
         }
         self.own.finish()
     }
@@ -246,7 +249,7 @@ impl<'a> Run<'a> {
 
     /// Gives up the stages downstream of one that failed.
     fn abandon(&mut self, position: usize, error: &Error) {
-        let gone = self.plan.downstream(&[position]);
+        let gone = self.pipeline.downstream(&[position]);
         let goes_on =
             self.stages.iter().enumerate().any(|(n, run)| !gone.contains(&n) && !run.todo.is_empty());
         if goes_on {
@@ -264,19 +267,19 @@ impl<'a> Run<'a> {
         done: &(dyn Fn(&'static str, i32, &Report) + Sync),
     ) -> Result<Vec<Result<()>>> {
         let stop = AtomicBool::new(false);
-        let shared = Shared { ctx, first: self.plan.scene.shot.frames.first, stop: &stop, done };
+        let shared = Shared { ctx, first: self.pipeline.scene.shot.frames.first, stop: &stop, done };
         let folder = self.own.folder().to_path_buf();
-        let upstream: Vec<Vec<Stored>> = ready
+        let upstream: Vec<Vec<DoneFrames>> = ready
             .iter()
             .map(|position| self.upstream(self.stages[*position].stage, &folder))
             .collect::<Result<_>>()?;
-        let plan = self.plan;
+        let pipeline = self.pipeline;
         let runs = self.stages.iter_mut().enumerate().filter(|(position, _)| ready.contains(position));
         Ok(std::thread::scope(|scope| {
             let threads: Vec<_> = runs
                 .zip(&upstream)
                 .map(|((_, run), upstream)| {
-                    let every_state = plan.keeps_states_of(run.stage);
+                    let every_state = pipeline.keeps_states_of(run.stage);
                     scope.spawn(move || {
                         let stop = StopOthers(shared.stop);
                         let result = run.make(&shared, upstream, every_state);
@@ -304,7 +307,7 @@ impl Drop for StopOthers<'_> {
 }
 
 impl StageRun<'_> {
-    fn make(&mut self, shared: &Shared<'_>, upstream: &[Stored], every_state: bool) -> Result<()> {
+    fn make(&mut self, shared: &Shared<'_>, upstream: &[DoneFrames], every_state: bool) -> Result<()> {
         let todo = std::mem::take(&mut self.todo);
         let Some(cache) = &mut self.cache else { return Ok(()) };
         let start = match self.start.take() {
@@ -312,7 +315,7 @@ impl StageRun<'_> {
             None => {
                 // The upstream frames were made only in this run.
                 cache.check_inputs(self.stage, &FrameChoice::none(), upstream)?;
-                self.stage.looks_ahead(shared.ctx, upstream, todo[todo.len() - 1])?;
+                self.stage.precheck_frames(shared.ctx, upstream, todo[todo.len() - 1])?;
                 self.stage.before(shared.ctx, todo[0], cache.kept(shared.first))?
             }
         };

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::error::Result;
 use crate::io::files::sequence::Pattern;
 use crate::io::records::input_hashes::InputHashes;
-use crate::scene::schema::key::Key;
-use crate::scene::schema::key::Scope::{First, Object};
+use crate::scene::schema::declaration::Key;
+use crate::scene::schema::declaration::Scope::{First, Object};
 use crate::scene::schema::values::path;
 use crate::scene::{Role, Scene};
 
@@ -42,7 +42,12 @@ fn named(key: &str) -> String {
 ///
 /// # Errors
 /// A file that cannot be read.
-pub fn settings_of(scene: &Scene, stage: &str, seen: &InputHashes, roles: &[Role]) -> Result<Settings> {
+pub fn settings_of(
+    scene: &Scene,
+    stage: &str,
+    input_hashes: &InputHashes,
+    roles: &[Role],
+) -> Result<Settings> {
     let mut settings: Settings = scene
         .values
         .iter()
@@ -59,11 +64,11 @@ pub fn settings_of(scene: &Scene, stage: &str, seen: &InputHashes, roles: &[Role
         .collect();
     for (index, object) in scene.objects.iter().enumerate().filter(|(_, o)| roles.contains(&o.role)) {
         let content = match (Pattern::parse(&object.file), object.role) {
-            (None, _) => seen.hash(&object.file)?,
+            (None, _) => input_hashes.hash(&object.file)?,
             (Some(pattern), Role::Static) => {
                 let at = f64::from(scene.shot.frames.first) - object.offset;
                 let [below, above] =
-                    [at.floor(), at.ceil()].map(|frame| seen.hash(&pattern.path(frame as i32)));
+                    [at.floor(), at.ceil()].map(|frame| input_hashes.hash(&pattern.path(frame as i32)));
                 below? + &above?
             }
             (Some(_), _) => "of each frame".to_string(),
@@ -77,7 +82,7 @@ pub fn settings_of(scene: &Scene, stage: &str, seen: &InputHashes, roles: &[Role
 }
 
 /// Those of a stage's settings that determine its first state.
-pub fn first_of(keys: &[Key], settings: &Settings, stage: &str) -> Settings {
+pub fn settings_of_first_state(keys: &[Key], settings: &Settings, stage: &str) -> Settings {
     let is_first = |path: &str| {
         let (table, name) = path.rsplit_once('.').unwrap_or_default();
         // The index is dropped: `object[1]`.

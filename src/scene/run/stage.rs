@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value};
 
+use super::done_frames::DoneFrames;
 use super::settings::Settings;
-use super::stored::Stored;
 use crate::context::{Context, PhaseTime};
 use crate::error::Result;
 use crate::geometry::TriMesh;
@@ -16,7 +16,7 @@ use crate::io::usd::{self, Clips, Field};
 
 /// A folder of a stage's files: `base/base.0012.vdb`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Kind {
+pub struct FileKind {
     /// Its name, lower-case letters, which is also that of the files in it.
     pub name: &'static str,
     /// Extensions of the files, lower-case letters.
@@ -43,12 +43,12 @@ pub trait Stage: Sync {
     }
 
     /// Why a folder may lack the exact state after a frame, for messages.
-    fn why_states_go(&self) -> &'static str {
+    fn why_states_are_missing(&self) -> &'static str {
         "state/ keeps those of the last two frames"
     }
 
     /// Its folders. A frame that [`Keeps::Whole`] or [`Keeps::Changes`] applies to is kept in the folder of the stage's own name.
-    fn kinds(&self) -> &'static [Kind];
+    fn kinds(&self) -> &'static [FileKind];
 
     /// Whether this scene has files of a kind.
     fn writes(&self, _kind: &str) -> bool {
@@ -72,7 +72,7 @@ pub trait Stage: Sync {
     fn settings(&self) -> Result<Settings>;
 
     /// Those of its settings that determine the state before the first frame: a run cannot resume from a state with others.
-    fn of_first_state(&self, _settings: &Settings) -> Settings {
+    fn first_state_settings(&self, _settings: &Settings) -> Settings {
         Settings::new()
     }
 
@@ -92,7 +92,7 @@ pub trait Stage: Sync {
     }
 
     /// Whether a frame depends on the frames before it.
-    fn remembers(&self) -> bool {
+    fn has_memory(&self) -> bool {
         true
     }
 
@@ -135,7 +135,7 @@ pub trait Stepping: Stage {
     ///
     /// # Errors
     /// Why the frames cannot be made.
-    fn foresee(&self, _ctx: &Context, _upstream: &[Stored], _last: i32) -> Result<()> {
+    fn precheck(&self, _ctx: &Context, _upstream: &[DoneFrames], _last: i32) -> Result<()> {
         Ok(())
     }
 
@@ -143,13 +143,18 @@ pub trait Stepping: Stage {
     ///
     /// # Errors
     /// Files that are not what was written; anything that the first state cannot be made from.
-    fn load(&self, ctx: &Context, done: &Stored, after: Option<i32>) -> Result<Self::State>;
+    fn load(&self, ctx: &Context, done: &DoneFrames, after: Option<i32>) -> Result<Self::State>;
 
     /// Advances the state to a frame from the one before it.
     ///
     /// # Errors
     /// Anything that prevents the frame from being made; cancel.
-    fn step(&self, ctx: &Context, state: &mut Self::State, to: &To<'_>) -> Result<Stepped<Self::Step>>;
+    fn step(
+        &self,
+        ctx: &Context,
+        state: &mut Self::State,
+        to: &StepTarget<'_>,
+    ) -> Result<Stepped<Self::Step>>;
 
     /// The writer's initial state, for a state from which steps will follow.
     ///
@@ -158,7 +163,7 @@ pub trait Stepping: Stage {
     fn writer(&self, ctx: &Context, state: &Self::State) -> Result<Self::Writer>;
 
     /// Whether a frame that cannot be written leaves the writer unchanged: later frames are then still written.
-    fn writes_alone(&self) -> bool {
+    fn writes_frames_independently(&self) -> bool {
         false
     }
 
@@ -176,13 +181,13 @@ pub trait Stepping: Stage {
 
 /// The frame that a step leads to.
 #[derive(Clone, Copy)]
-pub struct To<'a> {
+pub struct StepTarget<'a> {
     /// The frame.
     pub frame: i32,
     /// Hash of everything that the frame depends on, if its files are wanted.
     pub made_from: Option<&'a str>,
     /// The frames of the stages upstream, in the order of [`Stage::upstream`].
-    pub upstream: &'a [Stored],
+    pub upstream: &'a [DoneFrames],
 }
 
 /// The result of a step.

@@ -1,9 +1,9 @@
 //! `shot.usda`: the whole shot for programs that read USD.
 
+use super::done_frames::DoneFrames;
 use super::own_files::{Own, SHOT, manifest_of};
-use super::plan::Plan;
+use super::pipeline::Pipeline;
 use super::stage::{Stage, Volume};
-use super::stored::Stored;
 use crate::error::Result;
 use crate::io::usd::{self, Clips, VolumeFiles};
 
@@ -12,12 +12,12 @@ use crate::io::usd::{self, Clips, VolumeFiles};
 /// # Errors
 /// What the operating system reports.
 pub(super) fn write<'s>(
-    plan: &Plan,
-    stages: impl Iterator<Item = (&'s dyn Stage, &'s Stored)>,
+    pipeline: &Pipeline,
+    stages: impl Iterator<Item = (&'s dyn Stage, &'s DoneFrames)>,
     files: &mut Own,
 ) -> Result<()> {
-    let (frames, fps) = (plan.scene.shot.frames, plan.scene.shot.fps);
-    let relative = |stored: &Stored, kind: &str| -> Vec<(i32, String)> {
+    let (frames, fps) = (pipeline.scene.shot.frames, pipeline.scene.shot.fps);
+    let relative = |stored: &DoneFrames, kind: &str| -> Vec<(i32, String)> {
         let files = stored.files(kind).into_iter().filter(|(frame, _)| frames.contains(*frame));
         files.map(|(frame, path)| (frame, format!("./{path}"))).collect()
     };

@@ -6,9 +6,9 @@ use std::path::Path;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::done_frames::record_of;
 use super::own_files;
 use super::own_files::Own;
-use super::stored::record_of;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::records::checksummed;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Serialize, Serializer};
 
-use super::key::{Fallback, Key, Kind};
+use super::declaration::{Fallback, Key, Kind};
 use super::toml_table::{Table, joined, with_value};
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
@@ -51,15 +51,15 @@ pub struct Values {
 }
 
 /// A type that a key's value converts to.
-pub trait Settled: Sized {
+pub trait FromValue: Sized {
     /// `None` for a value of another type.
     fn of(value: &Value) -> Option<Self>;
 }
 
 /// Declares the types that values convert to: from which kind of value, and how.
-macro_rules! settled {
+macro_rules! from_value {
     ($($type:ty: $value:pat => $read:expr;)*) => {
-        $(impl Settled for $type {
+        $(impl FromValue for $type {
             fn of(value: &Value) -> Option<Self> {
                 if let $value = value { $read } else { None }
             }
@@ -67,7 +67,7 @@ macro_rules! settled {
     };
 }
 
-settled! {
+from_value! {
     f64: Value::Number(number) => Some(*number);
     i64: Value::Whole(whole) => Some(*whole);
     i32: Value::Whole(whole) => Some(*whole as i32);
@@ -84,7 +84,7 @@ settled! {
     Vec<KeyPose>: Value::Poses(poses) => Some(poses.clone());
 }
 
-impl<const N: usize> Settled for [f64; N] {
+impl<const N: usize> FromValue for [f64; N] {
     fn of(value: &Value) -> Option<Self> {
         if let Value::Numbers(numbers) = value { numbers[..].try_into().ok() } else { None }
     }
@@ -108,14 +108,14 @@ impl<'v> TableValues<'v> {
     ///
     /// # Panics
     /// A key that is not declared, has no default, or holds something else: a programming error, whatever the scene.
-    pub fn get<T: Settled>(&self, name: &str) -> T {
+    pub fn get<T: FromValue>(&self, name: &str) -> T {
         let value = self.value(name).cloned().or_else(|| self.values.declared(self.table, name));
         let value = value.as_ref().and_then(T::of);
         value.unwrap_or_else(|| panic!("{}.{name} has no default of this type", self.table))
     }
 
     /// The value of an optional key, if it has this type.
-    pub fn find<T: Settled>(&self, name: &str) -> Option<T> {
+    pub fn find<T: FromValue>(&self, name: &str) -> Option<T> {
         T::of(self.value(name)?)
     }
 

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::estimate;
 use super::inputs::area;
-use super::stage::liquid_over_time::LiquidState;
+use super::stage::liquid_state::LiquidState;
 use super::{Inputs, ML, Shallow};
 use crate::context::Context;
 use crate::error::{Error, Result};

@@ -1,8 +1,10 @@
 //! The keys of `[shallow]`, of its tables that may occur many times, and of `[output]` in such scenes.
 
 use crate::io::mesh::EXTENSIONS;
-use crate::scene::schema::key::Kind::{Choice, Choices, File, Flag, Number, Numbers, Poses, Text, Whole};
-use crate::scene::schema::key::{Key, Kind, OBJECT, Scope, Scopes, key, optional, or, required};
+use crate::scene::schema::declaration::Kind::{
+    Choice, Choices, File, Flag, Number, Numbers, Poses, Text, Whole,
+};
+use crate::scene::schema::declaration::{Key, Kind, OBJECT, Scope, Scopes, key, optional, or, required};
 use crate::scene::schema::{FAR, NO_ORIGIN, ORIGIN, ORIGIN_MEANS};
 
 /// A mesh, a level set or an image of heights.
@@ -95,7 +97,7 @@ pub const KEYS: &[Key] = &[
 ];
 
 /// The keys of tables that may occur many times, and of the output.
-pub const MANY_KEYS: &[Key] = &[
+pub const TABLE_ARRAY_KEYS: &[Key] = &[
     key(FIRST, "scalar", "name", Text, required("\"dye\""))
         .means("name of a scalar that the liquid carries, up to four, and of its array on the surface's vertices; letters, digits and _"),
     key(FIRST, "scalar", "law", Choice(&["dye", "decays", "ages"]), or("\"dye\""))

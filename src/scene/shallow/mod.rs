@@ -1,12 +1,12 @@
 //! A little liquid on a terrain in scenes: the keys of `[shallow]` and of the tables beside it, the contents of its files ([`Inputs`]), the
 //! check ([`check`]), estimates of memory and disk space, the stage `liquid` (`stage/`), and the surroundings for a picture of it
-//! ([`Around`]).
+//! ([`Surroundings`]).
 
 mod check;
 mod estimate;
 mod inputs;
 mod keys;
-mod plan;
+mod pipeline;
 mod stage;
 mod surroundings;
 
@@ -15,12 +15,12 @@ use std::path::{Path, PathBuf};
 pub use check::{Report, check};
 pub use inputs::Inputs;
 pub use inputs::scalars::Carried;
-pub(super) use keys::{KEYS, MANY_KEYS};
-pub use plan::plan;
-pub use surroundings::Around;
+pub(super) use keys::{KEYS, TABLE_ARRAY_KEYS};
+pub use pipeline::pipeline;
+pub use surroundings::Surroundings;
 
 use super::schema::Values;
-use super::schema::key::OBJECT;
+use super::schema::declaration::OBJECT;
 use super::{KeyPose, Role};
 use crate::io::files::sequence::Pattern;
 use crate::motion::Space;

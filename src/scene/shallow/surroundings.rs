@@ -9,7 +9,7 @@ use crate::io::records::input_hashes::InputHashes;
 use crate::scene::Scene;
 
 /// The surroundings of a scene's liquid at a frame (m).
-pub struct Around {
+pub struct Surroundings {
     /// The terrain.
     pub terrain: TriMesh,
     /// The obstacles, one mesh each; those from files come first.
@@ -18,7 +18,7 @@ pub struct Around {
     pub meshes: usize,
 }
 
-impl Around {
+impl Surroundings {
     /// Reads the surroundings.
     ///
     /// # Errors
@@ -28,7 +28,7 @@ impl Around {
         Self::with_terrain(terrain, scene, frame)
     }
 
-    /// As [`Around::read`], with a given terrain.
+    /// As [`Surroundings::read`], with a given terrain.
     ///
     /// # Errors
     /// As there.

@@ -12,7 +12,7 @@ use super::inspect::relief::Relief;
 use super::{Forecast, Inputs, MistForecast, has_grains, has_mist};
 use crate::context::Context;
 use crate::error::Result;
-use crate::scene::run::Stored;
+use crate::scene::run::DoneFrames;
 use crate::scene::{Layer, Scene, Value};
 use crate::snow::base_layer::initial::thin_warning;
 
@@ -66,11 +66,13 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs, folder: Option<&Path
         warnings.push("nothing moves through the snow: no object has the role collide".into());
     }
     let grains = match folder.filter(|_| has_grains(&scene.values)) {
-        Some(folder) => Forecast::of(scene, inputs, &Stored::read(folder, "base")?, scene.shot.frames.last)?,
+        Some(folder) => {
+            Forecast::of(scene, inputs, &DoneFrames::read(folder, "base")?, scene.shot.frames.last)?
+        }
         None => None,
     };
     let mist = folder.filter(|_| has_mist(&scene.values));
-    let mist = mist.map(|folder| Stored::read(folder, "mist")).transpose()?;
+    let mist = mist.map(|folder| DoneFrames::read(folder, "mist")).transpose()?;
     let mist = MistForecast::of(ctx, scene, &courses, mist.as_ref())?;
     let (memory, disk) = match &grains {
         Some(grains) => {

@@ -47,11 +47,11 @@ impl Drift {
     pub fn of(
         scene: &Scene,
         cell: f64,
-        seen: &InputHashes,
+        input_hashes: &InputHashes,
         warnings: &mut Vec<String>,
     ) -> Result<Option<Self>> {
         let Some(path) = file(scene) else { return Ok(None) };
-        seen.hash(path)?;
+        input_hashes.hash(path)?;
         let (positions, attributes) = if extension(path) == "ply" {
             let cloud = ply::read(path)?;
             (cloud.positions, cloud.attributes)

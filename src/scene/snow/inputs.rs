@@ -40,7 +40,7 @@ pub struct Inputs {
     /// Wind that varies in space.
     pub(super) wind: Option<VectorGrid>,
     /// Contents of the files when they were read.
-    pub(in crate::scene) seen: Arc<InputHashes>,
+    pub(in crate::scene) input_hashes: Arc<InputHashes>,
     /// Warnings about the files, one sentence each; they are logged too.
     pub warnings: Vec<String>,
 }
@@ -70,20 +70,24 @@ impl Inputs {
     /// # Errors
     /// Errors in files or keys, with file and key.
     pub fn load(scene: &Scene) -> Result<Self> {
-        let seen = Arc::new(InputHashes::default());
+        let input_hashes = Arc::new(InputHashes::default());
         let snow = scene.snow()?.clone();
         let mut warnings = Vec::new();
         let source = match &snow.layer {
             Layer::Grid(path) => {
-                let grid = layer_grid(path, snow.cell, &seen)?;
-                Source::Given { grid, ground: under(&snow, &seen, &mut warnings)? }
+                let grid = layer_grid(path, snow.cell, &input_hashes)?;
+                Source::Given { grid, ground: under(&snow, &input_hashes, &mut warnings)? }
             }
-            Layer::Depth(depth) => {
-                Source::Made { ground: ground(&snow, &seen, &mut warnings)?, cover: Cover::Depth(*depth) }
-            }
+            Layer::Depth(depth) => Source::Made {
+                ground: ground(&snow, &input_hashes, &mut warnings)?,
+                cover: Cover::Depth(*depth),
+            },
             Layer::Top(path) => {
-                let ground = ground(&snow, &seen, &mut warnings)?;
-                Source::Made { ground, cover: Cover::Top(read_mesh(path, &snow, &seen, &mut warnings)?) }
+                let ground = ground(&snow, &input_hashes, &mut warnings)?;
+                Source::Made {
+                    ground,
+                    cover: Cover::Top(read_mesh(path, &snow, &input_hashes, &mut warnings)?),
+                }
             }
         };
         if let Source::Made { ground, cover } = &source {
@@ -101,7 +105,7 @@ impl Inputs {
             if object.role == Role::Ignore {
                 continue;
             }
-            let motion = motion(scene, object, &seen, &mut warnings)?;
+            let motion = motion(scene, object, &input_hashes, &mut warnings)?;
             let (name, file) = (object_name(index, object), object.file.display());
             if object.role == Role::Static {
                 let (mesh, unclear) = posed(&*motion, start)?;
@@ -120,13 +124,13 @@ impl Inputs {
             bodies.push(body);
         }
         warnings.extend(replaced(&scene.values));
-        let drift = Drift::of(scene, snow.cell, &seen, &mut warnings)?;
+        let drift = Drift::of(scene, snow.cell, &input_hashes, &mut warnings)?;
         let wind = match wind::wind_file(scene) {
             None => None,
-            Some(path) => Some(seen.around(path, || wind::wind(path))?),
+            Some(path) => Some(input_hashes.around(path, || wind::wind(path))?),
         };
         warnings.iter().for_each(|warning| log::warn!("{warning}"));
-        Ok(Self { snow, source, statics, bodies, drift, wind, seen, warnings })
+        Ok(Self { snow, source, statics, bodies, drift, wind, input_hashes, warnings })
     }
 
     /// Minimum and maximum x and z of the snow (m), if known before it is made.
@@ -284,28 +288,33 @@ fn oriented(mesh: TriMesh, name: &str, warnings: &mut Vec<String>) -> TriMesh {
     orientation.applied_to(mesh)
 }
 
-fn read_mesh(path: &Path, snow: &Snow, seen: &InputHashes, warnings: &mut Vec<String>) -> Result<TriMesh> {
-    let mesh = mesh::parse_polygons_from(path, &seen.read(path)?, snow.origin)?;
+fn read_mesh(
+    path: &Path,
+    snow: &Snow,
+    input_hashes: &InputHashes,
+    warnings: &mut Vec<String>,
+) -> Result<TriMesh> {
+    let mesh = mesh::parse_polygons_from(path, &input_hashes.read(path)?, snow.origin)?;
     // Unused vertices are not part of the snow.
     Ok(oriented(mesh.into_triangles().without_unused(), &path.display().to_string(), warnings))
 }
 
-fn ground(snow: &Snow, seen: &InputHashes, warnings: &mut Vec<String>) -> Result<initial::Ground> {
+fn ground(snow: &Snow, input_hashes: &InputHashes, warnings: &mut Vec<String>) -> Result<initial::Ground> {
     match &snow.ground {
         Some(Ground::Plane { height, area: Some(area) }) => {
             Ok(initial::Ground::Plane { height: *height, area: *area })
         }
-        Some(Ground::Mesh(path)) => Ok(initial::Ground::Mesh(read_mesh(path, snow, seen, warnings)?)),
+        Some(Ground::Mesh(path)) => Ok(initial::Ground::Mesh(read_mesh(path, snow, input_hashes, warnings)?)),
         _ => Err(Error::argument("the snow has no ground")),
     }
 }
 
 /// The ground beside a given layer.
-fn under(snow: &Snow, seen: &InputHashes, warnings: &mut Vec<String>) -> Result<Option<Under>> {
+fn under(snow: &Snow, input_hashes: &InputHashes, warnings: &mut Vec<String>) -> Result<Option<Under>> {
     Ok(match &snow.ground {
         None => None,
         Some(Ground::Plane { height, .. }) => Some(Under::Level(*height)),
-        Some(Ground::Mesh(path)) => Some(Under::Mesh(read_mesh(path, snow, seen, warnings)?)),
+        Some(Ground::Mesh(path)) => Some(Under::Mesh(read_mesh(path, snow, input_hashes, warnings)?)),
     })
 }
 
@@ -316,8 +325,8 @@ fn unclear_corners(path: &Path, mesh: &TriMesh) -> Option<String> {
     what.map(|what| format!("{}: {what}", path.display()))
 }
 
-fn layer_grid(path: &Path, cell: f64, seen: &InputHashes) -> Result<FloatGrid> {
-    let grid = seen.around(path, || file::read_named(path, None))?;
+fn layer_grid(path: &Path, cell: f64, input_hashes: &InputHashes) -> Result<FloatGrid> {
+    let grid = input_hashes.around(path, || file::read_named(path, None))?;
     if grid.class() != GridClass::LevelSet {
         return Err(Error::file(path, format!("grid \"{}\" is not a level set", grid.name())));
     }
@@ -338,7 +347,7 @@ fn layer_grid(path: &Path, cell: f64, seen: &InputHashes) -> Result<FloatGrid> {
 fn motion(
     scene: &Scene,
     object: &Object,
-    seen: &Arc<InputHashes>,
+    input_hashes: &Arc<InputHashes>,
     warnings: &mut Vec<String>,
 ) -> Result<Box<dyn Motion>> {
     let fps = scene.shot.fps;
@@ -350,17 +359,28 @@ fn motion(
     });
     let keys = Keys::new(keys.collect())?.with_ease(object.ease);
     let own: Box<dyn Motion> = match Pattern::parse(&object.file) {
-        None if is_gltf(&object.file) => Box::new(character(scene, object, seen)?),
+        None if is_gltf(&object.file) => Box::new(character(scene, object, input_hashes)?),
         None => {
-            let polygons =
-                mesh::parse_polygons_from(&object.file, &seen.read(&object.file)?, object.space.origin)?;
+            let polygons = mesh::parse_polygons_from(
+                &object.file,
+                &input_hashes.read(&object.file)?,
+                object.space.origin,
+            )?;
             Box::new(Rigid::of_polygons(polygons, Keys::default()))
         }
         Some(pattern) => {
             let first = (f64::from(scene.shot.frames.first) - object.offset).floor() as i32;
             let last = (f64::from(scene.shot.frames.last) - object.offset).ceil() as i32;
             let origin = object.space.origin;
-            Box::new(MeshSequence::open_seen(pattern, first, last, fps, object.offset, seen.clone(), origin)?)
+            Box::new(MeshSequence::open_seen(
+                pattern,
+                first,
+                last,
+                fps,
+                object.offset,
+                input_hashes.clone(),
+                origin,
+            )?)
         }
     };
     let mut pose = Vec::new();
@@ -377,7 +397,7 @@ fn motion(
     Ok(Box::new(Placed::new(own, space, keys)))
 }
 
-fn character(scene: &Scene, object: &Object, seen: &InputHashes) -> Result<Character> {
+fn character(scene: &Scene, object: &Object, input_hashes: &InputHashes) -> Result<Character> {
     let play = Play {
         node: object.node.clone(),
         clip: object.clip.clone(),
@@ -385,7 +405,7 @@ fn character(scene: &Scene, object: &Object, seen: &InputHashes) -> Result<Chara
         start: (f64::from(scene.shot.frames.first) + object.offset) / scene.shot.fps,
     };
     let character = Character::open(&object.file, play)?;
-    seen.note(&object.file, character.content().to_string())?;
+    input_hashes.note(&object.file, character.content().to_string())?;
     if let Some(jump) = character.jump() {
         let metres = jump * object.space.scale;
         log::warn!(

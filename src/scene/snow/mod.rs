@@ -16,7 +16,7 @@ mod inputs;
 mod inspect;
 mod keys;
 #[cfg(feature = "vdb")]
-mod plan;
+mod pipeline;
 #[cfg(feature = "vdb")]
 mod stages;
 #[cfg(feature = "vdb")]
@@ -34,7 +34,7 @@ pub use {
     estimate::mist::MistForecast,
     inputs::Inputs,
     inspect::foot_slip::Walk,
-    plan::plan,
+    pipeline::pipeline,
     stages::grain_files::{RebuildGrains, changes_since, partial},
     stages::rebuild::Rebuild,
 };

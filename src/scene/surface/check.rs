@@ -85,7 +85,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     let mut most_bytes = Most::default();
     for path in &files {
         ctx.check()?;
-        let particles = read(path, surface, &inputs.seen)?;
+        let particles = read(path, surface, &inputs.input_hashes)?;
         ctx.pool().install(|| most_bytes.add(&particles, inputs.spacing, surface.cell));
         if let Some(before) = before.take().filter(|_| !has_warned) {
             // Particles with neither ids nor velocities are reported below.

@@ -1,8 +1,8 @@
 //! The keys of `[surface]`, and those of `[output]` in such scenes.
 
 use crate::io::mesh::EXTENSIONS;
-use crate::scene::schema::key::Kind::{Choice, Choices, File, Flag, Number, Whole};
-use crate::scene::schema::key::{Key, Scope, Scopes, key, optional, or, required};
+use crate::scene::schema::declaration::Kind::{Choice, Choices, File, Flag, Number, Whole};
+use crate::scene::schema::declaration::{Key, Scope, Scopes, key, optional, or, required};
 use crate::scene::schema::{NO_ORIGIN, ORIGIN, ORIGIN_MEANS};
 
 /// Last extensions of particle files: "gz" is that of .bgeo.gz.

@@ -9,7 +9,7 @@ mod estimate;
 mod inputs;
 mod keys;
 #[cfg(feature = "vdb")]
-mod plan;
+mod pipeline;
 #[cfg(feature = "vdb")]
 mod track;
 
@@ -20,7 +20,7 @@ pub(super) use keys::KEYS;
 pub use {
     check::{Report, check},
     inputs::Inputs,
-    plan::plan,
+    pipeline::pipeline,
 };
 
 use super::Frames;

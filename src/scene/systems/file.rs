@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
 use crate::error::{Error, Result};
-use crate::scene::schema::key::{Fallback, Key, heading, is_many};
-use crate::scene::schema::keys;
-use crate::scene::schema::keys::tables;
+use crate::scene::schema::declaration::{Fallback, Key, heading, is_table_array};
 use crate::scene::schema::overrides::Override;
+use crate::scene::schema::shared_keys;
+use crate::scene::schema::shared_keys::tables;
 use crate::scene::schema::toml_table::{Document, Table};
 use crate::scene::schema::values::Values;
 use crate::scene::{Object, Output, Scene, Shallow, Shot, Snow, Surface, System, snow};
@@ -124,7 +124,7 @@ fn read_table<'d>(
     values: &mut Values,
 ) -> Result<()> {
     let keys = values.keys();
-    if is_many(name) {
+    if is_table_array(name) {
         let tables = root.tables(name, &heading(name), &known(keys, name))?;
         return tables.iter().enumerate().try_for_each(|(index, table)| {
             values.read(name, Some(index), table)?;
@@ -138,7 +138,7 @@ fn read_table<'d>(
     let table = match root.table(name, &heading(name), &known(keys, name))? {
         Some(table) => table,
         None if name == "shot" => return Err(root.error(name, "is missing")),
-        None if keys::OPTIONAL.contains(&name) => return Ok(()),
+        None if shared_keys::OPTIONAL_TABLES.contains(&name) => return Ok(()),
         None if keys.iter().any(|key| key.table == name && key.fallback == Fallback::Required) => {
             return Ok(());
         }

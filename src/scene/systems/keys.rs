@@ -1,9 +1,9 @@
 //! The keys of each system.
 
 use crate::scene::System;
-use crate::scene::schema::key::Key;
-use crate::scene::schema::key::OBJECT;
-use crate::scene::schema::keys::{OBJECTS, OUTPUT, SHOT};
+use crate::scene::schema::declaration::Key;
+use crate::scene::schema::declaration::OBJECT;
+use crate::scene::schema::shared_keys::{OBJECTS, OUTPUT, SHOT};
 use crate::scene::schema::{reference_of, template_of};
 use crate::scene::shallow;
 use crate::scene::snow;
@@ -19,7 +19,7 @@ pub fn of(system: System) -> &'static [Key] {
     });
     static SURFACE: LazyLock<Vec<Key>> = LazyLock::new(|| ordered([SHOT, surface::KEYS, OUTPUT]));
     static SHALLOW: LazyLock<Vec<Key>> =
-        LazyLock::new(|| ordered([SHOT, shallow::KEYS, shallow::MANY_KEYS, OUTPUT]));
+        LazyLock::new(|| ordered([SHOT, shallow::KEYS, shallow::TABLE_ARRAY_KEYS, OUTPUT]));
     match system {
         System::Snow => &SNOW,
         System::Surface => &SURFACE,

@@ -1,9 +1,9 @@
 //! Writes a scene with every default filled in and commented: the file next to the output that reproduces it.
 
 use crate::scene::Scene;
-use crate::scene::schema::key::{Key, heading, is_many};
-use crate::scene::schema::keys::tables;
-use crate::scene::schema::template::line;
+use crate::scene::schema::declaration::{Key, heading, is_table_array};
+use crate::scene::schema::documentation::line;
+use crate::scene::schema::shared_keys::tables;
 use crate::scene::schema::values::{Value, pose};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ impl Scene {
             self.system.name()
         );
         for table in tables(self.values.keys()) {
-            let indices = match is_many(table) {
+            let indices = match is_table_array(table) {
                 true => (0..self.values.count(table)).map(Some).collect(),
                 false => vec![None],
             };

@@ -1,7 +1,7 @@
 //! Typed data shared by all systems, from the values of a scene: the shot, the objects, the output.
 
 use crate::error::Result;
-use crate::scene::schema::key::OBJECT;
+use crate::scene::schema::declaration::OBJECT;
 use crate::scene::schema::toml_table::Table;
 use crate::scene::schema::values::{TableValues, Values};
 use crate::scene::{BaseMode, Object, Output, Shot, VolumesOutput, snow};

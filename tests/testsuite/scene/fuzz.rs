@@ -250,7 +250,7 @@ fn ten_thousand_changed_records_are_used_or_refused() {
             }
             let frames = if round % 3 == 0 { &some } else { &all };
             let from = [3, 4].get(random.below(40)).copied();
-            drop(Run::prepare(&ctx, &snow::plan(&scene, &inputs), &out, &[], frames, from));
+            drop(Run::prepare(&ctx, &snow::pipeline(&scene, &inputs), &out, &[], frames, from));
         });
         assert!(precious.exists());
         fs::write(&record, &whole).unwrap();

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::io::files::sequence::Pattern;
 use crate::io::mesh::{EXTENSIONS, extension};
 use crate::scene::Frames;
-use crate::scene::schema::key::OBJECT;
+use crate::scene::schema::declaration::OBJECT;
 use crate::scene::schema::{Table, Value, Values};
 use crate::scene::shallow::{Form, Obstacle, Shallow};
 

@@ -62,7 +62,7 @@ pub struct Inputs {
     /// Whether all of them are flipped after that, as they face down.
     pub(super) is_turned: bool,
     /// Contents of the files when they were read.
-    pub(in crate::scene) seen: Arc<InputHashes>,
+    pub(in crate::scene) input_hashes: Arc<InputHashes>,
     /// Warnings about the files, one sentence each; they are logged too.
     pub warnings: Vec<String>,
 }
@@ -82,9 +82,9 @@ impl Inputs {
         if shallow.sequence().is_some() {
             frames.iter().try_for_each(|frame| source::open(&shallow.terrain_at(frame)).map(drop))?;
         }
-        let seen = Arc::new(InputHashes::default());
+        let input_hashes = Arc::new(InputHashes::default());
         let path = shallow.terrain_at(frames.first);
-        let mut terrain = Terrain::read(shallow, frames.first, &seen)?;
+        let mut terrain = Terrain::read(shallow, frames.first, &input_hashes)?;
         let bounds = terrain.bounds();
         let grid = grid(shallow, &bounds).map_err(|error| error.in_file(&scene.path))?;
         let heights = heights(shallow, &bounds).map_err(|error| error.in_file(&scene.path))?;
@@ -101,7 +101,7 @@ impl Inputs {
         if is_turned {
             warnings.push(format!("{}: its triangles face down: they are turned round", path.display()));
         }
-        let meshes = add_meshes(shallow, frames.first, &seen, &mut solids, &mut warnings)?;
+        let meshes = add_meshes(shallow, frames.first, &input_hashes, &mut solids, &mut warnings)?;
         let mesh = match terrain {
             Terrain::Mesh(mesh) => Some(mesh),
             #[cfg(any(feature = "cli", feature = "vdb"))]
@@ -126,7 +126,7 @@ impl Inputs {
             attached,
             orientation,
             is_turned,
-            seen,
+            input_hashes,
             warnings,
         };
         inputs.warnings.iter().for_each(|warning| log::warn!("{warning}"));
@@ -140,7 +140,7 @@ impl Inputs {
     pub(super) fn terrain_at(&self, shallow: &Shallow, frame: i32) -> Result<Option<TriMesh>> {
         let Some(first) = &self.moving else { return Ok(None) };
         let path = shallow.terrain_at(frame);
-        let mut mesh = read_mesh(&path, shallow.space, &self.seen)?;
+        let mut mesh = read_mesh(&path, shallow.space, &self.input_hashes)?;
         let other = |mesh: &TriMesh| {
             let count = |mesh: &TriMesh| {
                 format!("{} vertices and {} triangles", mesh.positions.len(), mesh.triangles.len())
@@ -217,11 +217,11 @@ fn solids(
 fn add_meshes(
     shallow: &Shallow,
     first: i32,
-    seen: &InputHashes,
+    input_hashes: &InputHashes,
     solids: &mut Solids,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<TriMesh>> {
-    let mut meshes = obstacles::meshes(shallow, first, seen)?;
+    let mut meshes = obstacles::meshes(shallow, first, input_hashes)?;
     for (mesh, own) in meshes.iter_mut().zip(shallow.obstacles.iter().filter_map(|own| own.file())) {
         let orientation = facing(mesh);
         *mesh = orientation.applied_to(std::mem::take(mesh));

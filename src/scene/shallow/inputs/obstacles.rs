@@ -45,9 +45,9 @@ impl Obstacle {
     ///
     /// # Errors
     /// A file that cannot be read.
-    fn mesh(&self, first: i32, seen: &InputHashes) -> Result<Option<TriMesh>> {
+    fn mesh(&self, first: i32, input_hashes: &InputHashes) -> Result<Option<TriMesh>> {
         let Form::Mesh(path, space) = &self.form else { return Ok(None) };
-        let mut mesh = read_mesh(path, *space, seen)?;
+        let mut mesh = read_mesh(path, *space, input_hashes)?;
         let (turn, at) = self.pose(first)?;
         mesh.positions
             .iter_mut()
@@ -71,9 +71,9 @@ pub(in crate::scene::shallow) fn shapes_at(shallow: &Shallow, frame: i32) -> Res
 pub(in crate::scene::shallow) fn meshes(
     shallow: &Shallow,
     first: i32,
-    seen: &InputHashes,
+    input_hashes: &InputHashes,
 ) -> Result<Vec<TriMesh>> {
-    shallow.obstacles.iter().filter_map(|obstacle| obstacle.mesh(first, seen).transpose()).collect()
+    shallow.obstacles.iter().filter_map(|obstacle| obstacle.mesh(first, input_hashes).transpose()).collect()
 }
 
 /// Points around a drawn sphere, and rings from its bottom to its middle.

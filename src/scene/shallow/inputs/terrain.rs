@@ -42,12 +42,12 @@ impl Terrain {
     ///
     /// # Errors
     /// A file that cannot be read, has changed since it was read, or needs a feature that this build lacks.
-    pub fn read(shallow: &Shallow, frame: i32, seen: &InputHashes) -> Result<Self> {
+    pub fn read(shallow: &Shallow, frame: i32, input_hashes: &InputHashes) -> Result<Self> {
         let path = shallow.terrain_at(frame);
         match (&*extension(&path), shallow.image) {
-            ("vdb", _) => of_vdb(&path, seen),
-            ("png", Some(position)) => of_image(&path, position, seen),
-            _ => Ok(Self::Mesh(read_mesh(&path, shallow.space, seen)?)),
+            ("vdb", _) => of_vdb(&path, input_hashes),
+            ("png", Some(position)) => of_image(&path, position, input_hashes),
+            _ => Ok(Self::Mesh(read_mesh(&path, shallow.space, input_hashes)?)),
         }
     }
 
@@ -149,8 +149,12 @@ impl Terrain {
 ///
 /// # Errors
 /// A file that cannot be read, or that has changed since it was read.
-pub(in crate::scene::shallow) fn read_mesh(path: &Path, space: Space, seen: &InputHashes) -> Result<TriMesh> {
-    let mut mesh = parse_polygons_from(path, &seen.read(path)?, space.origin)?.into_triangles();
+pub(in crate::scene::shallow) fn read_mesh(
+    path: &Path,
+    space: Space,
+    input_hashes: &InputHashes,
+) -> Result<TriMesh> {
+    let mut mesh = parse_polygons_from(path, &input_hashes.read(path)?, space.origin)?.into_triangles();
     let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
     let weld = Weld::of(&positions, &mesh.triangles);
     weld.unify(&mut mesh.positions);
@@ -164,8 +168,8 @@ pub(in crate::scene::shallow) fn read_mesh(path: &Path, space: Space, seen: &Inp
 }
 
 #[cfg(feature = "cli")]
-fn of_image(path: &Path, position: ImagePlace, seen: &InputHashes) -> Result<Terrain> {
-    Ok(Terrain::Image(image::parse(path, &seen.read(path)?)?, position))
+fn of_image(path: &Path, position: ImagePlace, input_hashes: &InputHashes) -> Result<Terrain> {
+    Ok(Terrain::Image(image::parse(path, &input_hashes.read(path)?)?, position))
 }
 
 #[cfg(not(feature = "cli"))]
@@ -202,11 +206,11 @@ fn relief(image: &image::Grey, position: ImagePlace) -> TriMesh {
 }
 
 #[cfg(feature = "vdb")]
-fn of_vdb(path: &Path, seen: &InputHashes) -> Result<Terrain> {
+fn of_vdb(path: &Path, input_hashes: &InputHashes) -> Result<Terrain> {
     // OpenVDB reads the file itself: its content must be the same before and after.
-    seen.hash(path)?;
+    input_hashes.hash(path)?;
     let grid = file::read_named(path, None)?;
-    seen.note(path, hash::of_file(path)?)?;
+    input_hashes.note(path, hash::of_file(path)?)?;
     if grid.class() != GridClass::LevelSet {
         return Err(Error::file(path, format!("grid \"{}\" is not a level set", grid.name())));
     }

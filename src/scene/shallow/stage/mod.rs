@@ -1,7 +1,7 @@
 //! The stage `liquid`: a little liquid flows over a terrain.
 
 pub(in crate::scene::shallow) mod liquid_mesh;
-pub(in crate::scene::shallow) mod liquid_over_time;
+pub(in crate::scene::shallow) mod liquid_state;
 #[cfg(feature = "vdb")]
 mod liquid_volume;
 mod saved_liquid;
@@ -18,14 +18,15 @@ use crate::io::mesh;
 use crate::io::usd::materials::Look;
 use crate::io::usd::{ClipPrims, Clips, MeshPrim, primvars};
 use crate::scene::Scene;
-use crate::scene::run::settings::{first_of, settings_of};
+use crate::scene::run::settings::{settings_of, settings_of_first_state};
 use crate::scene::run::{
-    CONTENT, FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
+    CONTENT, DoneFrames, FileKind, FrameFiles, Reads, Report, Settings, Stage, StepTarget, Stepped, Stepping,
+    Volume,
 };
 use crate::shallow;
 use crate::shallow::remap::Moved;
 use liquid_mesh::{Drawn, Mesher};
-use liquid_over_time::LiquidState;
+use liquid_state::LiquidState;
 
 /// Name of the stage, and of the kind of its files.
 const NAME: &str = "liquid";
@@ -84,7 +85,13 @@ impl<'a> Liquid<'a> {
         not(feature = "vdb"),
         expect(unused_variables, reason = "volumes say what they are made from")
     )]
-    fn written(&self, ctx: &Context, state: &mut State<'a>, to: &To<'_>, made_from: &str) -> Result<Written> {
+    fn written(
+        &self,
+        ctx: &Context,
+        state: &mut State<'a>,
+        to: &StepTarget<'_>,
+        made_from: &str,
+    ) -> Result<Written> {
         let State { course, mesher } = state;
         if std::mem::take(&mut course.is_stirred) {
             ctx.phase("lifts", || mesher.fit(&course.liquid, course.ground(), self.of))?;
@@ -122,11 +129,11 @@ impl Stage for Liquid<'_> {
         "liquid"
     }
 
-    fn kinds(&self) -> &'static [Kind] {
+    fn kinds(&self) -> &'static [FileKind] {
         &[
-            Kind { name: NAME, extensions: &["ply", "usda"] },
-            Kind { name: VOLUME, extensions: &["vdb"] },
-            Kind { name: TERRAIN, extensions: &["ply"] },
+            FileKind { name: NAME, extensions: &["ply", "usda"] },
+            FileKind { name: VOLUME, extensions: &["vdb"] },
+            FileKind { name: TERRAIN, extensions: &["ply"] },
         ]
     }
 
@@ -152,24 +159,26 @@ impl Stage for Liquid<'_> {
     }
 
     fn settings(&self) -> Result<Settings> {
-        let seen = &self.inputs.seen;
-        let mut settings = settings_of(self.scene, NAME, seen, ROLES)?;
+        let input_hashes = &self.inputs.input_hashes;
+        let mut settings = settings_of(self.scene, NAME, input_hashes, ROLES)?;
         let content = match self.of.sequence() {
             Some(_) => "of each frame".to_string(),
-            None => seen.hash(&self.of.terrain)?,
+            None => input_hashes.hash(&self.of.terrain)?,
         };
         settings.insert("shallow.terrain".into(), format!("{CONTENT}{content}"));
         for (index, obstacle) in self.of.obstacles.iter().enumerate() {
             if let Some(path) = obstacle.file() {
-                settings
-                    .insert(format!("object[{}].file", index + 1), format!("{CONTENT}{}", seen.hash(path)?));
+                settings.insert(
+                    format!("object[{}].file", index + 1),
+                    format!("{CONTENT}{}", input_hashes.hash(path)?),
+                );
             }
         }
         Ok(settings)
     }
 
-    fn of_first_state(&self, settings: &Settings) -> Settings {
-        first_of(self.scene.values.keys(), settings, NAME)
+    fn first_state_settings(&self, settings: &Settings) -> Settings {
+        settings_of_first_state(self.scene.values.keys(), settings, NAME)
     }
 
     fn reads(&self, frame: i32) -> Reads {
@@ -198,7 +207,7 @@ impl<'a> Stepping for Liquid<'a> {
     type Step = Option<Written>;
     type Writer = ();
 
-    fn load(&self, ctx: &Context, done: &Stored, after: Option<i32>) -> Result<State<'a>> {
+    fn load(&self, ctx: &Context, done: &DoneFrames, after: Option<i32>) -> Result<State<'a>> {
         let of = (self.scene, self.of, self.inputs);
         let course = match after {
             None => LiquidState::begin(ctx, of)?,
@@ -214,7 +223,7 @@ impl<'a> Stepping for Liquid<'a> {
         Ok(State { course, mesher: Mesher::default() })
     }
 
-    fn step(&self, ctx: &Context, state: &mut State<'a>, to: &To<'_>) -> Result<Stepped<Self::Step>> {
+    fn step(&self, ctx: &Context, state: &mut State<'a>, to: &StepTarget<'_>) -> Result<Stepped<Self::Step>> {
         let ((step, did), phases) = ctx.step(4, || {
             let did = self.go(ctx, &mut state.course, to.frame)?;
             let written = to.made_from.map(|made_from| self.written(ctx, state, to, made_from));
@@ -228,7 +237,7 @@ impl<'a> Stepping for Liquid<'a> {
         Ok(())
     }
 
-    fn writes_alone(&self) -> bool {
+    fn writes_frames_independently(&self) -> bool {
         true
     }
 

@@ -5,8 +5,8 @@ use serde::Serialize;
 use super::{disk, memory};
 use crate::error::{Error, Result};
 use crate::scene::Scene;
-use crate::scene::run::Stored;
-use crate::scene::schema::key::OBJECT;
+use crate::scene::run::DoneFrames;
+use crate::scene::schema::declaration::OBJECT;
 use crate::scene::snow::Inputs;
 use crate::scene::snow::grain_params::params;
 use crate::snow::grains::PACKING;
@@ -39,7 +39,7 @@ impl Forecast {
     ///
     /// # Errors
     /// A damaged report; a file of the layer that cannot be read.
-    pub fn of(scene: &Scene, inputs: &Inputs, base: &Stored, last: i32) -> Result<Option<Self>> {
+    pub fn of(scene: &Scene, inputs: &Inputs, base: &DoneFrames, last: i32) -> Result<Option<Self>> {
         let first = scene.shot.frames.first;
         let mut removed = Vec::new();
         for frame in first..=last {

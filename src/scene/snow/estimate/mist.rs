@@ -10,7 +10,7 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::scene::Scene;
-use crate::scene::run::Stored;
+use crate::scene::run::DoneFrames;
 use crate::scene::snow::inspect::object_path::ObjectPath;
 use crate::scene::snow::keys::mist::mist_params;
 use crate::snow::mist::{self, MIN_DENSITY, Params};
@@ -65,7 +65,7 @@ impl MistForecast {
         ctx: &Context,
         scene: &Scene,
         courses: &[ObjectPath],
-        stored: Option<&Stored>,
+        stored: Option<&DoneFrames>,
     ) -> Result<Option<Self>> {
         let Some(params) = mist_params(&scene.values) else { return Ok(None) };
         let last = scene.shot.frames.last;
@@ -124,7 +124,7 @@ fn rounded(length: f64) -> f64 {
 
 /// The last frame of existing mist, up to `last`, and the maximum cells of its frames, converted to cells of an edge `cell` (m); `None` if
 /// no mist was raised yet, or no file is left that states the size of its cells.
-fn made(stored: &Stored, cell: f64, last: i32) -> Result<Option<(i32, f64)>> {
+fn made(stored: &DoneFrames, cell: f64, last: i32) -> Result<Option<(i32, f64)>> {
     let (mut end, mut counts) = (None, Vec::new());
     for frame in stored.frames().filter(|frame| *frame <= last) {
         let report = stored.report(frame)?;

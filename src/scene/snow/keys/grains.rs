@@ -1,8 +1,8 @@
 //! The keys of `[grains]`, and the keys of objects that concern grains.
 
 use crate::error::Result;
-use crate::scene::schema::key::Kind::{Cells, Choice, File, Flag, Number, Numbers, Whole};
-use crate::scene::schema::key::{Key, OBJECT, Scope, Scopes, key, optional, or, or_cells};
+use crate::scene::schema::declaration::Kind::{Cells, Choice, File, Flag, Number, Numbers, Whole};
+use crate::scene::schema::declaration::{Key, OBJECT, Scope, Scopes, key, optional, or, or_cells};
 use crate::scene::schema::{FAR, Table, Values, rounded};
 use crate::snow::{grain_cohesion, grain_friction};
 

@@ -1,8 +1,8 @@
 //! The keys of `[mist]`.
 
 use crate::error::{Error, Result};
-use crate::scene::schema::key::Kind::{Cells, Flag, Number, NumbersOrFile, Whole};
-use crate::scene::schema::key::{Key, Scope, Scopes, key, optional, or, or_cells};
+use crate::scene::schema::declaration::Kind::{Cells, Flag, Number, NumbersOrFile, Whole};
+use crate::scene::schema::declaration::{Key, Scope, Scopes, key, optional, or, or_cells};
 use crate::scene::schema::{Table, Values};
 use crate::scene::snow::has_grains;
 use crate::snow::mist::{FASTEST_WIND, Params};

@@ -1,7 +1,7 @@
 //! The keys of `[output]` in scenes with snow.
 
-use crate::scene::schema::key::Kind::{Choice, Choices, Flag};
-use crate::scene::schema::key::{Key, Scope, Scopes, key, or};
+use crate::scene::schema::declaration::Kind::{Choice, Choices, Flag};
+use crate::scene::schema::declaration::{Key, Scope, Scopes, key, or};
 
 const BASE: Scopes = &[("base", Scope::Output)];
 const GRAINS: Scopes = &[("grains", Scope::Output)];

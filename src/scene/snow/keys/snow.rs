@@ -3,8 +3,8 @@
 use super::mist::mist_params;
 use crate::error::Result;
 use crate::io::mesh::{EXTENSIONS, extension};
-use crate::scene::schema::key::Kind::{Cells, File, Flag, HeightOrFile, Number, Numbers, Whole};
-use crate::scene::schema::key::{Key, OBJECT, Scope, Scopes, key, optional, or, or_cells, required};
+use crate::scene::schema::declaration::Kind::{Cells, File, Flag, HeightOrFile, Number, Numbers, Whole};
+use crate::scene::schema::declaration::{Key, OBJECT, Scope, Scopes, key, optional, or, or_cells, required};
 use crate::scene::schema::{FAR, NO_ORIGIN, ORIGIN, Table, Value, Values};
 use crate::scene::{Ground, Layer, Snow};
 use crate::snow::NoiseParams;

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::io::records::manifest::Keeps;
 use crate::io::usd::{Field, Holds};
 use crate::scene::run::{
-    FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
+    DoneFrames, FileKind, FrameFiles, Reads, Report, Settings, Stage, StepTarget, Stepped, Stepping, Volume,
 };
 use crate::scene::snow::inputs::Inputs;
 use crate::scene::vdb_metadata::metadata;
@@ -70,12 +70,12 @@ impl Stage for Base<'_> {
         "layer"
     }
 
-    fn why_states_go(&self) -> &'static str {
+    fn why_states_are_missing(&self) -> &'static str {
         "`half` and `base = []` keep those of the last two frames"
     }
 
-    fn kinds(&self) -> &'static [Kind] {
-        &[Kind { name: "base", extensions: &["vdb"] }, Kind { name: "removed", extensions: &["vdb"] }]
+    fn kinds(&self) -> &'static [FileKind] {
+        &[FileKind { name: "base", extensions: &["vdb"] }, FileKind { name: "removed", extensions: &["vdb"] }]
     }
 
     fn writes(&self, kind: &str) -> bool {
@@ -83,10 +83,10 @@ impl Stage for Base<'_> {
     }
 
     fn settings(&self) -> Result<Settings> {
-        settings::of_base(self.scene, &self.inputs.seen)
+        settings::of_base(self.scene, &self.inputs.input_hashes)
     }
 
-    fn of_first_state(&self, settings: &Settings) -> Settings {
+    fn first_state_settings(&self, settings: &Settings) -> Settings {
         settings::of_layer(self.scene.values.keys(), settings)
     }
 
@@ -128,7 +128,7 @@ impl Stepping for Base<'_> {
     type Step = Step;
     type Writer = Writer;
 
-    fn load(&self, ctx: &Context, done: &Stored, after: Option<i32>) -> Result<BaseLayer> {
+    fn load(&self, ctx: &Context, done: &DoneFrames, after: Option<i32>) -> Result<BaseLayer> {
         let scene = self.scene;
         let noise = Some(self.inputs.snow.noise).filter(|noise| noise.amplitude > 0.0);
         let params = Params { noise, tolerance: TOLERANCE };
@@ -152,7 +152,7 @@ impl Stepping for Base<'_> {
         Ok(layer)
     }
 
-    fn step(&self, ctx: &Context, layer: &mut BaseLayer, to: &To<'_>) -> Result<Stepped<Step>> {
+    fn step(&self, ctx: &Context, layer: &mut BaseLayer, to: &StepTarget<'_>) -> Result<Stepped<Step>> {
         let frame = to.frame;
         let time = |frame: i32| f64::from(frame) / self.scene.shot.fps;
         // The first frame cuts out the first poses; nothing has moved yet.

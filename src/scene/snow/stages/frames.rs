@@ -2,7 +2,7 @@
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::scene::run::Stored;
+use crate::scene::run::DoneFrames;
 use crate::snow::base_layer::Grids;
 use crate::vdb::file;
 
@@ -10,7 +10,7 @@ use crate::vdb::file;
 ///
 /// # Errors
 /// A missing frame; a file that is not what was written.
-pub(in crate::scene::snow) fn grids(ctx: &Context, done: &Stored, frame: i32) -> Result<Grids> {
+pub(in crate::scene::snow) fn grids(ctx: &Context, done: &DoneFrames, frame: i32) -> Result<Grids> {
     let mut frames = done.frames_to(frame)?;
     let whole = frames.next().unwrap_or(frame);
     let mut grids = read_grids(done, whole)?;
@@ -23,7 +23,7 @@ pub(in crate::scene::snow) fn grids(ctx: &Context, done: &Stored, frame: i32) ->
 /// Updates a layer from the frame before to a frame that stores its changes.
 pub(in crate::scene::snow) fn follow(
     ctx: &Context,
-    done: &Stored,
+    done: &DoneFrames,
     grids: &mut Grids,
     frame: i32,
 ) -> Result<()> {
@@ -31,7 +31,7 @@ pub(in crate::scene::snow) fn follow(
     grids.apply_delta(ctx, &read_grids(done, frame)?)
 }
 
-fn read_grids(done: &Stored, frame: i32) -> Result<Grids> {
+fn read_grids(done: &DoneFrames, frame: i32) -> Result<Grids> {
     let path = done.state_file(frame)?;
     Grids::from_named(file::read_own(&path)?).map_err(|error| error.in_file(path))
 }
@@ -48,7 +48,7 @@ impl LayerReader {
     ///
     /// # Errors
     /// As [`grids`].
-    pub fn after(&mut self, ctx: &Context, done: &Stored, frame: i32) -> Result<&Grids> {
+    pub fn after(&mut self, ctx: &Context, done: &DoneFrames, frame: i32) -> Result<&Grids> {
         let follows =
             |before: i32| before <= frame && (before + 1..=frame).all(|between| done.keeps_changes(between));
         let layer = match self.at.take() {

@@ -13,7 +13,7 @@ use crate::geometry::points::{Column, Points, Values};
 use crate::io::files::hash::Hasher;
 use crate::io::mesh::extension;
 use crate::scene::Scene;
-use crate::scene::run::{FrameFiles, Stored};
+use crate::scene::run::{DoneFrames, FrameFiles};
 use crate::scene::vdb_metadata::metadata;
 use crate::vdb::file::{self, WriteOptions};
 use crate::vdb::{MetaValue, points};
@@ -296,7 +296,7 @@ fn runs_of_text(text: &str) -> Option<Vec<Run>> {
 
 /// Reads complete grains from a cache, frame by frame.
 pub struct RebuildGrains {
-    stored: Stored,
+    stored: DoneFrames,
     whole: Whole,
 }
 
@@ -304,13 +304,13 @@ impl RebuildGrains {
     /// Opens a cache.
     ///
     /// # Errors
-    /// As [`Stored::read`].
+    /// As [`DoneFrames::read`].
     pub fn open(folder: &Path) -> Result<Self> {
-        Ok(Self { stored: Stored::read(folder, NAME)?, whole: Whole::default() })
+        Ok(Self { stored: DoneFrames::read(folder, NAME)?, whole: Whole::default() })
     }
 
     /// The stored frames.
-    pub fn stored(&self) -> &Stored {
+    pub fn stored(&self) -> &DoneFrames {
         &self.stored
     }
 
@@ -348,7 +348,7 @@ impl Whole {
     ///
     /// # Errors
     /// A frame that does not exist; a file that was changed since it was written; cancel.
-    pub fn points(&mut self, ctx: &Context, stored: &Stored, frame: i32) -> Result<(&Points, Metadata)> {
+    pub fn points(&mut self, ctx: &Context, stored: &DoneFrames, frame: i32) -> Result<(&Points, Metadata)> {
         let (mut later, mut metadata, mut at) = (Vec::new(), None, frame);
         let mut points = loop {
             ctx.check()?;
@@ -374,12 +374,12 @@ impl Whole {
     }
 }
 
-fn wrong(stored: &Stored, frame: i32, error: Error) -> Error {
+fn wrong(stored: &DoneFrames, frame: i32, error: Error) -> Error {
     error.in_file_at(stored.folder(), format!("frame {frame} of grains "))
 }
 
 /// The points of a frame's file, with its metadata.
-fn read(stored: &Stored, frame: i32) -> Result<(Points, Metadata)> {
+fn read(stored: &DoneFrames, frame: i32) -> Result<(Points, Metadata)> {
     let path = stored.file(frame, NAME)?;
     if extension(&path) != "vdb" {
         return Err(Error::file(stored.folder(), format!("frame {frame} has no .vdb file in {NAME}/")));

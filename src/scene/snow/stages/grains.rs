@@ -11,9 +11,11 @@ use crate::error::{Error, Result};
 use crate::geometry::{Points, TriMesh};
 use crate::io::particles::ply;
 use crate::io::usd::{ClipPrims, Clips, points};
-use crate::scene::run::settings::first_of;
-use crate::scene::run::{FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To};
-use crate::scene::schema::key::OBJECT;
+use crate::scene::run::settings::settings_of_first_state;
+use crate::scene::run::{
+    DoneFrames, FileKind, FrameFiles, Reads, Report, Settings, Stage, StepTarget, Stepped, Stepping,
+};
+use crate::scene::schema::declaration::OBJECT;
 use crate::scene::snow::estimate::grains::Forecast;
 use crate::scene::snow::grain_params::params;
 use crate::scene::snow::initial_grains;
@@ -121,7 +123,7 @@ impl<'a> Grains<'a> {
     }
 
     /// The base layer after a frame; made from the layer before it if that is given and the frame stores changes.
-    fn layer(&self, ctx: &Context, stored: &Stored, before: Option<&Grids>, frame: i32) -> Result<Grids> {
+    fn layer(&self, ctx: &Context, stored: &DoneFrames, before: Option<&Grids>, frame: i32) -> Result<Grids> {
         match before {
             Some(before) if stored.keeps_changes(frame) => {
                 let mut layer = before.deep_copy()?;
@@ -176,8 +178,8 @@ impl Stage for Grains<'_> {
         "grains"
     }
 
-    fn kinds(&self) -> &'static [Kind] {
-        &[Kind { name: "grains", extensions: &["vdb", "ply", "usda"] }]
+    fn kinds(&self) -> &'static [FileKind] {
+        &[FileKind { name: "grains", extensions: &["vdb", "ply", "usda"] }]
     }
 
     fn writes(&self, _kind: &str) -> bool {
@@ -191,11 +193,11 @@ impl Stage for Grains<'_> {
 
     fn settings(&self) -> Result<Settings> {
         let initial = initial_grains::file(self.scene).map(|path| ("grains.initial", path));
-        settings::of_stage(self.scene, self.name(), &self.inputs.seen, initial)
+        settings::of_stage(self.scene, self.name(), &self.inputs.input_hashes, initial)
     }
 
-    fn of_first_state(&self, settings: &Settings) -> Settings {
-        first_of(self.scene.values.keys(), settings, "grains")
+    fn first_state_settings(&self, settings: &Settings) -> Settings {
+        settings_of_first_state(self.scene.values.keys(), settings, "grains")
     }
 
     fn upstream(&self) -> &'static [&'static str] {
@@ -226,7 +228,7 @@ impl Stepping for Grains<'_> {
     type Step = Option<grains::Grains>;
     type Writer = Writer;
 
-    fn foresee(&self, ctx: &Context, upstream: &[Stored], last: i32) -> Result<()> {
+    fn precheck(&self, ctx: &Context, upstream: &[DoneFrames], last: i32) -> Result<()> {
         let [base] = upstream else { return Err(Error::Internal("grains read one stage".into())) };
         let Some(forecast) = Forecast::of(self.scene, self.inputs, base, last)? else { return Ok(()) };
         log::info!(
@@ -246,7 +248,7 @@ impl Stepping for Grains<'_> {
         Ok(())
     }
 
-    fn load(&self, _ctx: &Context, done: &Stored, after: Option<i32>) -> Result<State> {
+    fn load(&self, _ctx: &Context, done: &DoneFrames, after: Option<i32>) -> Result<State> {
         let params = params(self.scene, self.inputs.snow.cell);
         let grains = match after {
             None => grains::Grains::new(params),
@@ -256,7 +258,7 @@ impl Stepping for Grains<'_> {
         Ok(State { grains, layer: None, has_warned: false })
     }
 
-    fn step(&self, ctx: &Context, state: &mut State, to: &To<'_>) -> Result<Stepped<Self::Step>> {
+    fn step(&self, ctx: &Context, state: &mut State, to: &StepTarget<'_>) -> Result<Stepped<Self::Step>> {
         let [stored] = to.upstream else { return Err(Error::Internal("grains read one stage".into())) };
         let frame = to.frame;
         let is_first = frame == self.scene.shot.frames.first;

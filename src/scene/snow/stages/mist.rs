@@ -12,9 +12,9 @@ use crate::geometry::points::Values;
 use crate::geometry::{DVec3, Points, TriMesh};
 use crate::io::usd::{Field, Holds};
 use crate::motion::{Keys, Rigid};
-use crate::scene::run::settings::first_of;
+use crate::scene::run::settings::settings_of_first_state;
 use crate::scene::run::{
-    FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
+    DoneFrames, FileKind, FrameFiles, Reads, Report, Settings, Stage, StepTarget, Stepped, Stepping, Volume,
 };
 use crate::scene::snow::inputs::Inputs;
 use crate::scene::snow::keys::mist::mist_params;
@@ -54,7 +54,7 @@ pub struct State {
 ///
 /// # Errors
 /// A frame that does not exist; a file that was changed since it was written, or that has no such grid.
-pub(in crate::scene::snow) fn density(stored: &Stored, frame: i32) -> Result<FloatGrid> {
+pub(in crate::scene::snow) fn density(stored: &DoneFrames, frame: i32) -> Result<FloatGrid> {
     file::read_own_named(&stored.file(frame, NAME)?, DENSITY)
 }
 
@@ -69,7 +69,13 @@ impl Mist<'_> {
     }
 
     /// The grains of a frame that may raise mist.
-    fn sources(&self, ctx: &Context, state: &mut State, stored: &Stored, frame: i32) -> Result<Vec<Source>> {
+    fn sources(
+        &self,
+        ctx: &Context,
+        state: &mut State,
+        stored: &DoneFrames,
+        frame: i32,
+    ) -> Result<Vec<Source>> {
         let of_frame =
             |frame: i32, error| Error::file(stored.folder(), format!("frame {frame} of grains {error}"));
         let State { mist, grains, starts: known, .. } = state;
@@ -88,7 +94,7 @@ impl Mist<'_> {
     }
 
     /// Moves the mist through a frame.
-    fn move_mist(&self, ctx: &Context, state: &mut State, to: &To<'_>) -> Result<StepReport> {
+    fn move_mist(&self, ctx: &Context, state: &mut State, to: &StepTarget<'_>) -> Result<StepReport> {
         let [base, grains] = to.upstream else {
             return Err(Error::Internal("mist reads two stages".into()));
         };
@@ -195,8 +201,8 @@ impl Stage for Mist<'_> {
         NAME
     }
 
-    fn kinds(&self) -> &'static [Kind] {
-        &[Kind { name: NAME, extensions: &["vdb"] }]
+    fn kinds(&self) -> &'static [FileKind] {
+        &[FileKind { name: NAME, extensions: &["vdb"] }]
     }
 
     fn writes(&self, _kind: &str) -> bool {
@@ -209,11 +215,11 @@ impl Stage for Mist<'_> {
 
     fn settings(&self) -> Result<Settings> {
         let wind = wind_file(self.scene).map(|path| ("mist.wind", path));
-        settings::of_stage(self.scene, self.name(), &self.inputs.seen, wind)
+        settings::of_stage(self.scene, self.name(), &self.inputs.input_hashes, wind)
     }
 
-    fn of_first_state(&self, settings: &Settings) -> Settings {
-        first_of(self.scene.values.keys(), settings, NAME)
+    fn first_state_settings(&self, settings: &Settings) -> Settings {
+        settings_of_first_state(self.scene.values.keys(), settings, NAME)
     }
 
     fn upstream(&self) -> &'static [&'static str] {
@@ -242,7 +248,7 @@ impl Stepping for Mist<'_> {
     /// Provides the threads. Its cancel flag is ignored: a frame that was begun is finished.
     type Writer = Context;
 
-    fn load(&self, _ctx: &Context, done: &Stored, after: Option<i32>) -> Result<State> {
+    fn load(&self, _ctx: &Context, done: &DoneFrames, after: Option<i32>) -> Result<State> {
         let params = self.params()?;
         let mist = match after {
             None => mist::Mist::new(params).map_err(|error| self.with_path(error))?,
@@ -253,7 +259,7 @@ impl Stepping for Mist<'_> {
         Ok(State { mist, statics, grains: Whole::default(), starts: None, layer: LayerReader::default() })
     }
 
-    fn step(&self, ctx: &Context, state: &mut State, to: &To<'_>) -> Result<Stepped<Self::Step>> {
+    fn step(&self, ctx: &Context, state: &mut State, to: &StepTarget<'_>) -> Result<Stepped<Self::Step>> {
         // Before the first frame nothing moves.
         let report = match to.frame == self.scene.shot.frames.first {
             true => StepReport::default(),

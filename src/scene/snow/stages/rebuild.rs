@@ -5,12 +5,12 @@ use std::path::Path;
 use super::frames::LayerReader;
 use crate::context::Context;
 use crate::error::Result;
-use crate::scene::run::Stored;
+use crate::scene::run::DoneFrames;
 use crate::snow::base_layer::Grids;
 
 /// The whole layers of a cache, frame by frame.
 pub struct Rebuild {
-    stored: Stored,
+    stored: DoneFrames,
     layer: LayerReader,
 }
 
@@ -18,13 +18,13 @@ impl Rebuild {
     /// Opens a cache.
     ///
     /// # Errors
-    /// As [`Stored::read`].
+    /// As [`DoneFrames::read`].
     pub fn open(folder: &Path) -> Result<Self> {
-        Ok(Self { stored: Stored::read(folder, "base")?, layer: LayerReader::default() })
+        Ok(Self { stored: DoneFrames::read(folder, "base")?, layer: LayerReader::default() })
     }
 
     /// The stored frames.
-    pub fn stored(&self) -> &Stored {
+    pub fn stored(&self) -> &DoneFrames {
         &self.stored
     }
 

@@ -4,19 +4,19 @@ use std::path::Path;
 
 use crate::error::Result;
 use crate::io::records::input_hashes::InputHashes;
-use crate::scene::run::settings::{first_of, settings_of};
+use crate::scene::run::settings::{settings_of, settings_of_first_state};
 use crate::scene::run::{CONTENT, Settings};
-use crate::scene::schema::key::Key;
+use crate::scene::schema::declaration::Key;
 use crate::scene::{Layer, Role, Scene};
 
 /// The settings that the base depends on. Of the frames only the first counts: a shot may be extended.
 ///
 /// # Errors
 /// An input that cannot be read.
-pub(in crate::scene::snow) fn of_base(scene: &Scene, seen: &InputHashes) -> Result<Settings> {
-    let mut settings = settings_of(scene, "base", seen, &[Role::Collide, Role::Base, Role::Static])?;
+pub(in crate::scene::snow) fn of_base(scene: &Scene, input_hashes: &InputHashes) -> Result<Settings> {
+    let mut settings = settings_of(scene, "base", input_hashes, &[Role::Collide, Role::Base, Role::Static])?;
     for (key, path) in scene.snow.iter().flat_map(|snow| snow.files()) {
-        settings.insert(key.into(), format!("{CONTENT}{}", seen.hash(path)?));
+        settings.insert(key.into(), format!("{CONTENT}{}", input_hashes.hash(path)?));
     }
     // A given layer does not depend on what it lies on.
     if scene.snow.as_ref().is_some_and(|snow| matches!(snow.layer, Layer::Grid(_))) {
@@ -32,13 +32,14 @@ pub(in crate::scene::snow) fn of_base(scene: &Scene, seen: &InputHashes) -> Resu
 pub(in crate::scene::snow) fn of_stage(
     scene: &Scene,
     stage: &str,
-    seen: &InputHashes,
+    input_hashes: &InputHashes,
     own: Option<(&'static str, &Path)>,
 ) -> Result<Settings> {
-    let mut settings = settings_of(scene, stage, seen, &[&Role::MOVING[..], &[Role::Static]].concat())?;
+    let mut settings =
+        settings_of(scene, stage, input_hashes, &[&Role::MOVING[..], &[Role::Static]].concat())?;
     let files = scene.snow.iter().flat_map(|snow| snow.files()).map(|(key, path)| (key, path.as_path()));
     for (key, path) in files.filter(|(key, _)| *key == "snow.ground").chain(own) {
-        settings.insert(key.into(), format!("{CONTENT}{}", seen.hash(path)?));
+        settings.insert(key.into(), format!("{CONTENT}{}", input_hashes.hash(path)?));
     }
     Ok(settings)
 }
@@ -46,7 +47,7 @@ pub(in crate::scene::snow) fn of_stage(
 /// The settings that determine the layer before the first frame: stored frames cannot continue another layer. Static objects are numbered
 /// separately, as other objects may be added or removed.
 pub(in crate::scene::snow) fn of_layer(keys: &[Key], all: &Settings) -> Settings {
-    let mut out = first_of(keys, all, "base");
+    let mut out = settings_of_first_state(keys, all, "base");
     let index = |key: &str| key.strip_prefix("object[")?.strip_suffix("].role")?.parse::<usize>().ok();
     let statics = all.iter().filter(|(_, role)| *role == "\"static\"");
     let mut statics: Vec<usize> = statics.filter_map(|(key, _)| index(key)).collect();

@@ -14,7 +14,9 @@ use crate::io::records::manifest::Keeps;
 use crate::io::usd::materials::Look;
 use crate::io::usd::{self, ClipPrims, Clips, Field, Holds, MeshPrim};
 use crate::scene::run::settings::settings_of;
-use crate::scene::run::{FrameFiles, Kind, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume};
+use crate::scene::run::{
+    DoneFrames, FileKind, FrameFiles, Report, Settings, Stage, StepTarget, Stepped, Stepping, Volume,
+};
 use crate::scene::snow::Inputs;
 use crate::scene::snow::estimate::memory;
 use crate::scene::snow::grain_params::params;
@@ -33,7 +35,7 @@ pub struct Volumes<'a> {
     needs: Needs,
 }
 
-/// Kept from frame to frame only to read less.
+/// Resumable from frame to frame only to read less.
 #[derive(Default)]
 pub struct State {
     layer: LayerReader,
@@ -63,14 +65,14 @@ impl<'a> Volumes<'a> {
     }
 
     /// The frames of an upstream stage.
-    fn stored<'s>(&self, upstream: &'s [Stored], name: &str) -> Result<&'s Stored> {
+    fn stored<'s>(&self, upstream: &'s [DoneFrames], name: &str) -> Result<&'s DoneFrames> {
         let index = self.upstream().iter().position(|upstream| *upstream == name);
         let stored = index.and_then(|index| upstream.get(index));
         stored.ok_or_else(|| Error::Internal(format!("volumes do not read {name}")))
     }
 
     /// Reads the inputs of a frame.
-    fn read<'s>(&self, ctx: &Context, state: &'s mut State, to: &To<'_>) -> Result<Source<'s>> {
+    fn read<'s>(&self, ctx: &Context, state: &'s mut State, to: &StepTarget<'_>) -> Result<Source<'s>> {
         let State { layer, grains } = state;
         let mut source = Source { frame: to.frame, base: None, grains: None, mist: None };
         if self.needs.base {
@@ -189,11 +191,11 @@ impl Stage for Volumes<'_> {
         "volumes"
     }
 
-    fn kinds(&self) -> &'static [Kind] {
+    fn kinds(&self) -> &'static [FileKind] {
         &[
-            Kind { name: "fog", extensions: &["vdb"] },
-            Kind { name: "snow", extensions: &["vdb"] },
-            Kind { name: "mesh", extensions: &["ply", "usda"] },
+            FileKind { name: "fog", extensions: &["vdb"] },
+            FileKind { name: "snow", extensions: &["vdb"] },
+            FileKind { name: "mesh", extensions: &["ply", "usda"] },
         ]
     }
 
@@ -206,7 +208,7 @@ impl Stage for Volumes<'_> {
     }
 
     fn settings(&self) -> Result<Settings> {
-        settings_of(self.scene, self.name(), &self.inputs.seen, &[])
+        settings_of(self.scene, self.name(), &self.inputs.input_hashes, &[])
     }
 
     fn upstream(&self) -> &'static [&'static str] {
@@ -226,7 +228,7 @@ impl Stage for Volumes<'_> {
         false
     }
 
-    fn remembers(&self) -> bool {
+    fn has_memory(&self) -> bool {
         false
     }
 
@@ -273,7 +275,7 @@ impl Stepping for Volumes<'_> {
     type Step = Files;
     type Writer = ();
 
-    fn foresee(&self, ctx: &Context, upstream: &[Stored], last: i32) -> Result<()> {
+    fn precheck(&self, ctx: &Context, upstream: &[DoneFrames], last: i32) -> Result<()> {
         let grains = match self.needs.grains {
             true => most_grains(self.stored(upstream, "grains")?, last)?,
             false => 0,
@@ -283,11 +285,11 @@ impl Stepping for Volumes<'_> {
         ctx.allow(&what, needed)
     }
 
-    fn load(&self, _ctx: &Context, _done: &Stored, _after: Option<i32>) -> Result<State> {
+    fn load(&self, _ctx: &Context, _done: &DoneFrames, _after: Option<i32>) -> Result<State> {
         Ok(State::default())
     }
 
-    fn step(&self, ctx: &Context, state: &mut State, to: &To<'_>) -> Result<Stepped<Files>> {
+    fn step(&self, ctx: &Context, state: &mut State, to: &StepTarget<'_>) -> Result<Stepped<Files>> {
         let Some(made_from) = to.made_from else {
             return Ok(Stepped { step: Files::new(), report: Report::default() });
         };
@@ -307,7 +309,7 @@ impl Stepping for Volumes<'_> {
         Ok(())
     }
 
-    fn writes_alone(&self) -> bool {
+    fn writes_frames_independently(&self) -> bool {
         true
     }
 
@@ -318,7 +320,7 @@ impl Stepping for Volumes<'_> {
 }
 
 /// The maximum count of grains after any frame up to `last`, from the existing reports.
-fn most_grains(grains: &Stored, last: i32) -> Result<u64> {
+fn most_grains(grains: &DoneFrames, last: i32) -> Result<u64> {
     let mut most = 0;
     for frame in grains.frames().filter(|frame| *frame <= last) {
         let count = grains.report(frame)?.and_then(|report| report.get("grains")?.as_u64());

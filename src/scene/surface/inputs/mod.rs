@@ -42,7 +42,7 @@ pub struct Inputs {
     /// Frames at which an edited mesh replaces the tracked one, ascending.
     pub(super) sculpts: Vec<i32>,
     /// Contents of the files when they were read.
-    pub(in crate::scene) seen: Arc<InputHashes>,
+    pub(in crate::scene) input_hashes: Arc<InputHashes>,
     /// Warnings about the files, one sentence each; they are logged too.
     pub warnings: Vec<String>,
 }
@@ -60,8 +60,8 @@ impl Inputs {
             return Err(Error::file(&surface.particles, what));
         }
         let sculpts = sculpts::frames(surface, shot.frames)?;
-        let seen = Arc::new(InputHashes::default());
-        let (begins, particles) = first_particles(ctx, scene, surface, &seen)?;
+        let input_hashes = Arc::new(InputHashes::default());
+        let (begins, particles) = first_particles(ctx, scene, surface, &input_hashes)?;
         let first = surface.files_at(shot.frames, begins).swap_remove(0);
         if particles.ids.is_empty() && particles.velocities.is_empty() && shot.frames.count() > 1 {
             let what =
@@ -110,7 +110,7 @@ impl Inputs {
         warnings.extend(base_mesh::too_far(&name, far, 1.0, surface.cell * spacing, base_mesh::BY_KEY));
         let mut mesh = match &surface.mesh {
             Some(path) => {
-                let (mesh, warning) = read_mesh(ctx, surface, path, &seen, spacing)?;
+                let (mesh, warning) = read_mesh(ctx, surface, path, &input_hashes, spacing)?;
                 warnings.extend(warning);
                 mesh
             }
@@ -132,7 +132,8 @@ impl Inputs {
         };
         mesh.arrays.retain(|array| !REPLACED.contains(&&*array.name));
         let mesh = Arc::new(mesh);
-        let mut inputs = Self { mesh, detail_retention, spacing, begins, particles, sculpts, seen, warnings };
+        let mut inputs =
+            Self { mesh, detail_retention, spacing, begins, particles, sculpts, input_hashes, warnings };
         let of_sculpts = sculpts::check(ctx, surface, &inputs)?;
         inputs.warnings.extend(of_sculpts);
         inputs.warnings.iter().for_each(|warning| log::warn!("{warning}"));
@@ -148,10 +149,10 @@ pub(super) fn read_mesh(
     ctx: &Context,
     surface: &Surface,
     path: &Path,
-    seen: &InputHashes,
+    input_hashes: &InputHashes,
     spacing: f64,
 ) -> Result<(DetailedMesh, Option<String>)> {
-    let bytes = seen.read(path)?;
+    let bytes = input_hashes.read(path)?;
     // Unused vertices follow nothing.
     let mut mesh = parse_polygons_from(path, &bytes, surface.space.origin)?.into_detailed().without_unused();
     let space = surface.space;
@@ -207,10 +208,10 @@ fn first_particles(
     ctx: &Context,
     scene: &Scene,
     surface: &Surface,
-    seen: &InputHashes,
+    input_hashes: &InputHashes,
 ) -> Result<(i32, Particles)> {
     let frames = scene.shot.frames;
-    let mut liquid = Liquid::new(surface, scene.shot, seen);
+    let mut liquid = Liquid::new(surface, scene.shot, input_hashes);
     for frame in frames.first..=frames.last {
         ctx.check()?;
         let particles = liquid.at(surface.time(frames, frame))?;

@@ -23,12 +23,12 @@ const IDS: [&str; 4] = ["id", "ids", "particle_id", "particleid"];
 ///
 /// # Errors
 /// A file that cannot be read, or that holds only the changes since another frame.
-pub fn read_cloud(path: &Path, seen: &InputHashes) -> Result<ParticleData> {
+pub fn read_cloud(path: &Path, input_hashes: &InputHashes) -> Result<ParticleData> {
     if extension(path) != "vdb" {
-        return particles::parse(path, &seen.read(path)?);
+        return particles::parse(path, &input_hashes.read(path)?);
     }
     source::open(path)?;
-    seen.around(path, || match changes_since(path)? {
+    input_hashes.around(path, || match changes_since(path)? {
         Some(since) => Err(Error::file(path, partial(since))),
         None => Ok(points::read(path, None)?.into()),
     })
@@ -41,9 +41,9 @@ pub fn read_cloud(path: &Path, seen: &InputHashes) -> Result<ParticleData> {
 pub(in crate::scene::surface) fn read(
     path: &Path,
     surface: &Surface,
-    seen: &InputHashes,
+    input_hashes: &InputHashes,
 ) -> Result<Particles> {
-    let cloud = read_cloud(path, seen)?;
+    let cloud = read_cloud(path, input_hashes)?;
     let named = |names: &'static [&str]| {
         let is_it = |name: &str| names.contains(&&*name.to_lowercase());
         cloud
@@ -74,7 +74,7 @@ pub(in crate::scene::surface) fn read(
 pub(in crate::scene::surface) struct Liquid<'a> {
     surface: &'a Surface,
     shot: Shot,
-    seen: &'a InputHashes,
+    input_hashes: &'a InputHashes,
     /// The particles of the last files, by file number.
     kept: Vec<(i32, Arc<Particles>)>,
 }
@@ -83,8 +83,8 @@ pub(in crate::scene::surface) struct Liquid<'a> {
 pub(in crate::scene::surface) const KEPT: usize = 4;
 
 impl<'a> Liquid<'a> {
-    pub fn new(surface: &'a Surface, shot: Shot, seen: &'a InputHashes) -> Self {
-        Self { surface, shot, seen, kept: Vec::new() }
+    pub fn new(surface: &'a Surface, shot: Shot, input_hashes: &'a InputHashes) -> Self {
+        Self { surface, shot, input_hashes, kept: Vec::new() }
     }
 
     /// The times (frames of the sequence) through which the mesh steps from the previous frame to this one: it stops at every file in
@@ -130,7 +130,7 @@ impl<'a> Liquid<'a> {
         if let Some((_, particles)) = self.kept.iter().find(|(number, _)| *number == file) {
             return Ok(particles.clone());
         }
-        let particles = Arc::new(read(&self.path(file), self.surface, self.seen)?);
+        let particles = Arc::new(read(&self.path(file), self.surface, self.input_hashes)?);
         if self.kept.len() == KEPT {
             self.kept.remove(0);
         }

@@ -80,7 +80,7 @@ pub fn check(ctx: &Context, surface: &Surface, inputs: &Inputs) -> Result<Vec<St
 /// of range, if any fades; cancel.
 pub fn read_sculpt(ctx: &Context, surface: &Surface, inputs: &Inputs, frame: i32) -> Result<Option<Sculpt>> {
     let Some(path) = path_at(surface, &inputs.sculpts, frame) else { return Ok(None) };
-    let (mesh, warning) = read_mesh(ctx, surface, &path, &inputs.seen, inputs.spacing)?;
+    let (mesh, warning) = read_mesh(ctx, surface, &path, &inputs.input_hashes, inputs.spacing)?;
     let mut warnings: Vec<String> = warning.into_iter().collect();
     let fades = surface.half_life.is_some() || surface.fade != 0.0;
     let detail_retention = match detail_retention(&mesh) {

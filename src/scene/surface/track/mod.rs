@@ -21,8 +21,10 @@ use crate::io::usd::{ClipPrims, Clips, MeshPrim, primvars};
 use crate::io::{mesh, usd};
 use crate::mesh_repair::Traced;
 use crate::scene::Scene;
-use crate::scene::run::settings::{first_of, settings_of};
-use crate::scene::run::{CONTENT, FrameFiles, Kind, Reads, Settings, Stage, Stepped, Stepping, Stored, To};
+use crate::scene::run::settings::{settings_of, settings_of_first_state};
+use crate::scene::run::{
+    CONTENT, DoneFrames, FileKind, FrameFiles, Reads, Settings, Stage, StepTarget, Stepped, Stepping,
+};
 use tracked_shot::{At, TrackedShot, reads};
 
 /// Name of the stage, and of the kind of its files.
@@ -82,8 +84,8 @@ impl Stage for Track<'_> {
         "mesh"
     }
 
-    fn kinds(&self) -> &'static [Kind] {
-        &[Kind { name: NAME, extensions: &["ply", "usda", "obj"] }]
+    fn kinds(&self) -> &'static [FileKind] {
+        &[FileKind { name: NAME, extensions: &["ply", "usda", "obj"] }]
     }
 
     fn writes(&self, _kind: &str) -> bool {
@@ -104,21 +106,21 @@ impl Stage for Track<'_> {
     }
 
     fn settings(&self) -> Result<Settings> {
-        let seen = &self.inputs.seen;
-        let mut settings = settings_of(self.scene, NAME, seen, &[])?;
+        let input_hashes = &self.inputs.input_hashes;
+        let mut settings = settings_of(self.scene, NAME, input_hashes, &[])?;
         settings.insert("surface.particles".into(), format!("{CONTENT}of each frame"));
         settings.insert("surface.spacing".into(), format!("{:?}", self.inputs.spacing));
         if self.surface.resculpt.is_some() {
             settings.insert("surface.resculpt".into(), format!("{CONTENT}of each frame"));
         }
         if let Some(path) = &self.surface.mesh {
-            settings.insert("surface.mesh".into(), format!("{CONTENT}{}", seen.hash(path)?));
+            settings.insert("surface.mesh".into(), format!("{CONTENT}{}", input_hashes.hash(path)?));
         }
         Ok(settings)
     }
 
-    fn of_first_state(&self, settings: &Settings) -> Settings {
-        first_of(self.scene.values.keys(), settings, NAME)
+    fn first_state_settings(&self, settings: &Settings) -> Settings {
+        settings_of_first_state(self.scene.values.keys(), settings, NAME)
     }
 
     fn reads(&self, frame: i32) -> Reads {
@@ -140,7 +142,7 @@ impl<'a> Stepping for Track<'a> {
     type Step = Option<Written>;
     type Writer = ();
 
-    fn load(&self, ctx: &Context, done: &Stored, after: Option<i32>) -> Result<TrackedShot<'a>> {
+    fn load(&self, ctx: &Context, done: &DoneFrames, after: Option<i32>) -> Result<TrackedShot<'a>> {
         let Some(frame) = after else {
             // A mesh that is not near the particles is refused before anything is written.
             return TrackedShot::begin(ctx, self.scene, self.surface, self.inputs);
@@ -150,7 +152,12 @@ impl<'a> Stepping for Track<'a> {
         TrackedShot::resume(ctx, (self.scene, self.surface, self.inputs), frame, kept)
     }
 
-    fn step(&self, ctx: &Context, walk: &mut TrackedShot<'a>, to: &To<'_>) -> Result<Stepped<Self::Step>> {
+    fn step(
+        &self,
+        ctx: &Context,
+        walk: &mut TrackedShot<'a>,
+        to: &StepTarget<'_>,
+    ) -> Result<Stepped<Self::Step>> {
         walk.go(ctx, to.frame)?;
         let At { tracker, detail, report, source, is_dry, .. } = walk.now();
         let written = || {
@@ -173,7 +180,7 @@ impl<'a> Stepping for Track<'a> {
         Ok(())
     }
 
-    fn writes_alone(&self) -> bool {
+    fn writes_frames_independently(&self) -> bool {
         true
     }
 

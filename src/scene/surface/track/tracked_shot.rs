@@ -127,7 +127,7 @@ impl<'a> TrackedShot<'a> {
     }
 
     fn at((scene, surface, inputs): (&'a Scene, &'a Surface, &'a Inputs), frame: i32, at: At) -> Self {
-        let (liquid, known) = (Liquid::new(surface, scene.shot, &inputs.seen), VecDeque::from([at]));
+        let (liquid, known) = (Liquid::new(surface, scene.shot, &inputs.input_hashes), VecDeque::from([at]));
         Self { scene, surface, inputs, liquid, frame, known, end: None, has_warned: false }
     }
 

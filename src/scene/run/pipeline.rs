@@ -4,24 +4,24 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::cache::Cache;
+use super::done_frames::DoneFrames;
 use super::pass::AnyStage;
 use super::stage::Stage;
-use super::stored::Stored;
 use crate::error::{Error, Result};
 use crate::io::records::input_hashes::InputHashes;
 use crate::scene::Scene;
 
 /// A scene with its stages, upstream stages first.
-pub struct Plan<'a> {
+pub struct Pipeline<'a> {
     /// The scene.
     pub scene: &'a Scene,
     /// Contents of its files when they were read.
-    pub seen: &'a Arc<InputHashes>,
+    pub input_hashes: &'a Arc<InputHashes>,
     /// Its stages.
     pub stages: Vec<Box<dyn AnyStage + 'a>>,
 }
 
-impl Plan<'_> {
+impl Pipeline<'_> {
     /// The stages, as descriptions.
     pub fn stages(&self) -> impl Iterator<Item = &dyn Stage> {
         self.stages.iter().map(|stage| &**stage as &dyn Stage)
@@ -61,9 +61,9 @@ impl Plan<'_> {
         for reader in chosen.iter().map(|position| &self.stages[*position]) {
             let others = self.stages().enumerate().filter(|(position, _)| !chosen.contains(position));
             for (_, stage) in others.filter(|(_, stage)| reader.upstream().contains(&stage.name())) {
-                let upstream = stage.upstream().iter().map(|name| Stored::read(folder, name));
-                let upstream: Vec<Stored> = upstream.collect::<Result<_>>()?;
-                Cache::refuse_stale(stage, self.seen, folder, reader.name(), &upstream)?;
+                let upstream = stage.upstream().iter().map(|name| DoneFrames::read(folder, name));
+                let upstream: Vec<DoneFrames> = upstream.collect::<Result<_>>()?;
+                Cache::refuse_stale(stage, self.input_hashes, folder, reader.name(), &upstream)?;
             }
         }
         Ok(())

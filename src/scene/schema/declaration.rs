@@ -166,14 +166,14 @@ impl Key {
 /// The table of objects; a scene may have many.
 pub const OBJECT: &str = "object";
 /// All tables that a scene may have many of.
-pub const MANY: [&str; 6] = [OBJECT, "scalar", "pour", "source", "drain", "absorber"];
+pub const TABLE_ARRAYS: [&str; 6] = [OBJECT, "scalar", "pour", "source", "drain", "absorber"];
 
 /// Whether a scene may have many of a table.
-pub fn is_many(table: &str) -> bool {
-    MANY.contains(&table)
+pub fn is_table_array(table: &str) -> bool {
+    TABLE_ARRAYS.contains(&table)
 }
 
 /// A table as a scene writes it: `[snow]`, `[[object]]`.
 pub fn heading(table: &str) -> String {
-    if is_many(table) { format!("[[{table}]]") } else { format!("[{table}]") }
+    if is_table_array(table) { format!("[[{table}]]") } else { format!("[{table}]") }
 }

@@ -11,13 +11,13 @@ use crate::io::records::checksummed;
 use crate::io::records::manifest::{Keeps, Manifest, Written};
 
 /// The frames of a stage in a folder.
-pub struct Stored {
+pub struct DoneFrames {
     folder: PathBuf,
     stage: String,
     done: BTreeMap<i32, Manifest>,
 }
 
-impl Stored {
+impl DoneFrames {
     /// Reads the records of a stage in a folder; frames whose files are missing or have another length are not done; a folder without
     /// records has no frames.
     ///
@@ -162,7 +162,7 @@ impl Stored {
     /// Resumes from the exact state after a frame.
     ///
     /// # Errors
-    /// As [`Stored::state_file`]; what `resume` refuses, with the name of the file.
+    /// As [`DoneFrames::state_file`]; what `resume` refuses, with the name of the file.
     pub fn resume<T>(&self, frame: i32, resume: impl FnOnce(&[u8]) -> Result<T>) -> Result<T> {
         let path = self.state_file(frame)?;
         let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
@@ -180,7 +180,7 @@ impl Stored {
     /// A frame's file of a kind with an extension; the content was verified.
     ///
     /// # Errors
-    /// As [`Stored::file`].
+    /// As [`DoneFrames::file`].
     pub fn file_with(&self, frame: i32, kind: &str, extension: &str) -> Result<PathBuf> {
         self.find(frame, kind, |written| {
             Path::new(&written.path).extension().is_some_and(|is| is == extension)
@@ -229,11 +229,11 @@ pub(super) fn record_of(name: &str) -> Option<(&str, i32)> {
 
 /// What a stage can resume from.
 #[derive(Clone, Copy)]
-pub struct Kept<'a> {
+pub struct Resumable<'a> {
     /// The shot's first frame.
     pub first: i32,
     /// First frame that was made with the current settings.
     pub own_from: i32,
     /// The frames that are done.
-    pub done: &'a Stored,
+    pub done: &'a DoneFrames,
 }

@@ -1,8 +1,8 @@
 //! The keys that all systems share.
 
-use super::key::Kind::{Choice, File, Flag, Frames, Number, Poses, Text};
-use super::key::Scope::{First, Object, Step};
-use super::key::{Key, Kind, OBJECT, Scopes, key, optional, or, required};
+use super::declaration::Kind::{Choice, File, Flag, Frames, Number, Poses, Text};
+use super::declaration::Scope::{First, Object, Step};
+use super::declaration::{Key, Kind, OBJECT, Scopes, key, optional, or, required};
 use crate::io::mesh::EXTENSIONS;
 
 /// Farthest coordinate allowed in a scene (m): f32 positions keep millimetres up to here.
@@ -20,7 +20,7 @@ pub const NO_ORIGIN: &str = "[0.0, 0.0, 0.0]";
 const MOVES: Scopes = &[("base", Object), ("grains", Object), ("mist", Object), ("objects", Step)];
 
 /// Tables whose stages exist only if a scene has the table.
-pub const OPTIONAL: &[&str] = &["grains", "mist"];
+pub const OPTIONAL_TABLES: &[&str] = &["grains", "mist"];
 
 /// Extensions of moving objects: characters and meshes.
 const MOVING: &[&str] = &["glb", "gltf", EXTENSIONS[0], EXTENSIONS[1], EXTENSIONS[2]];

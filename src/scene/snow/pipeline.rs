@@ -8,10 +8,10 @@ use super::stages::volumes::Volumes;
 use super::{has_grains, has_mist};
 use crate::scene::Scene;
 use crate::scene::objects::Objects;
-use crate::scene::run::{AnyStage, Plan};
+use crate::scene::run::{AnyStage, Pipeline};
 
 /// The stages of a scene with snow.
-pub fn plan<'a>(scene: &'a Scene, inputs: &'a Inputs) -> Plan<'a> {
+pub fn pipeline<'a>(scene: &'a Scene, inputs: &'a Inputs) -> Pipeline<'a> {
     let mut stages: Vec<Box<dyn AnyStage + 'a>> = vec![Box::new(Base { scene, inputs })];
     if has_grains(&scene.values) {
         stages.push(Box::new(Grains::new(scene, inputs)));
@@ -24,7 +24,7 @@ pub fn plan<'a>(scene: &'a Scene, inputs: &'a Inputs) -> Plan<'a> {
         stages.push(Box::new(Volumes::new(scene, inputs)));
     }
     if scene.output.objects_usd || scene.output.objects_ply {
-        stages.push(Box::new(Objects::new(scene, &inputs.bodies, &inputs.seen)));
+        stages.push(Box::new(Objects::new(scene, &inputs.bodies, &inputs.input_hashes)));
     }
-    Plan { scene, seen: &inputs.seen, stages }
+    Pipeline { scene, input_hashes: &inputs.input_hashes, stages }
 }

@@ -1,7 +1,7 @@
 //! Documentation of all keys: a starter scene, and a table.
 
-use super::key::{Fallback, Key, Kind, heading, is_many};
-use super::keys::{self, tables};
+use super::declaration::{Fallback, Key, Kind, heading, is_table_array};
+use super::shared_keys::{self, tables};
 
 use super::toml_table::with_value;
 use super::values::any_of;
@@ -18,8 +18,8 @@ pub fn template_of([title, name]: [&str; 2], keys: &[Key]) -> String {
         let keys_of = || keys.iter().filter(|key| key.table == table);
         let is_needed = keys_of().any(|key| key.example.is_shown);
         let many = match table {
-            _ if is_many(table) => "  # as many as there are",
-            _ if keys::OPTIONAL.contains(&table) => "  # only with this line are there any",
+            _ if is_table_array(table) => "  # as many as there are",
+            _ if shared_keys::OPTIONAL_TABLES.contains(&table) => "  # only with this line are there any",
             _ => "",
         };
         let _ = writeln!(out, "\n{}{}{many}", if is_needed { "" } else { "# " }, heading(table));
@@ -63,7 +63,7 @@ fn cells(key: &Key) -> String {
 pub fn reference_of(keys: &[Key]) -> String {
     let mut out = String::new();
     for table in tables(keys) {
-        let many = if is_many(table) { ", as many as there are" } else { "" };
+        let many = if is_table_array(table) { ", as many as there are" } else { "" };
         let _ = write!(out, "\n`{}`{many}\n\n", heading(table));
         out.push_str("| key | holds | default | meaning |\n|---|---|---|---|\n");
         for key in keys.iter().filter(|key| key.table == table) {
