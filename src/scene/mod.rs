@@ -1,7 +1,7 @@
-//! Scene files (TOML): they describe a shot, are read with every default filled in ([`Scene::read`], `schema/`, `systems/`), checked
-//! against their inputs and run frame by frame.
+//! Scene files (TOML) describe a shot. They are read with every default filled in ([`Scene::read`], `schema/`, `systems/`), checked
+//! against their inputs, and run frame by frame.
 //!
-//! [`run`] runs any stage; [`snow`], [`surface`] and [`shallow`] have the inputs, the check and the stages of a system; the stage `objects`
+//! [`run`] runs any stage. [`snow`], [`surface`] and [`shallow`] have the inputs, the check and the stages of a system. The stage `objects`
 //! writes the objects as they move. A new stage is a type with the traits [`run::Stage`] and [`run::Stepping`] beside its system, listed in
 //! the system's pipeline ([`snow::pipeline`]) and in the scopes of the keys that it depends on.
 //!
@@ -15,7 +15,7 @@
 //! | pass | a stage's loop over the frames to be made |
 //! | record | the manifest of a frame's files, written last: a frame is done when it exists |
 //! | settings | the values that a stage depends on; if one changes, its frames are made again |
-//! | state | what a pass resumes from exactly: a stage's own files, or bytes in `state/` |
+//! | state | the exact data that a pass resumes from: a stage's own files, or bytes in `state/` |
 
 mod moving;
 mod objects;
@@ -85,7 +85,7 @@ impl System {
         }
     }
 
-    /// What its scenes show, in a few words.
+    /// A title for its starter scene.
     pub(crate) fn title(self) -> &'static str {
         match self {
             Self::Snow => "Snow that objects press into",
@@ -111,10 +111,10 @@ impl Shot {
     }
 }
 
-/// The layer of snow before the first frame, and how it is edited.
+/// The layer of snow before the first frame, and how it is cut.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snow {
-    /// What the snow lies on. Optional if `layer` is a .vdb file; then only grains lie on it.
+    /// The ground under the snow. Optional if `layer` is a .vdb file; then only grains lie on it.
     pub ground: Option<Ground>,
     /// How the layer is given.
     pub layer: Layer,
@@ -122,13 +122,13 @@ pub struct Snow {
     pub origin: DVec3,
     /// Edge of a voxel (m), above 0, up to 10.
     pub cell: f64,
-    /// Raggedness of the edges; an amplitude of 0 switches it off.
+    /// Raggedness of cut edges; an amplitude of 0 switches it off.
     pub noise: NoiseParams,
-    /// Islands of fewer voxels are removed, 0..=10,000; 0: none are.
+    /// Islands of fewer voxels are removed, 0..=10,000; 0: none.
     pub min_crumb: usize,
 }
 
-/// What the snow lies on.
+/// The ground under the snow.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ground {
     /// A level plane.
@@ -164,7 +164,7 @@ pub struct Object {
     pub clip: Option<String>,
     /// Whether the clip starts again when it ends.
     pub repeat: bool,
-    /// Its sequence, or its clip, starts this many frames later; without offset a clip starts at the shot's first frame.
+    /// Frames by which its sequence or its clip starts later; without offset a clip starts at the shot's first frame.
     pub offset: f64,
     /// The file's unit and upward axis.
     pub space: Space,
@@ -172,7 +172,7 @@ pub struct Object {
     pub role: Role,
     /// Whether its cuts have ragged edges.
     pub noise: bool,
-    /// Rigid motion on top of the file's own; ascending frames; may be empty.
+    /// Rigid motion on top of the file's own, by ascending frames; may be empty.
     pub keys: Vec<KeyPose>,
     /// Whether the motion between keys is eased: see [`crate::motion::Keys::with_ease`].
     pub ease: bool,
@@ -185,7 +185,7 @@ pub struct KeyPose {
     pub frame: f64,
     /// Position of the object's origin (m).
     pub at: [f64; 3],
-    /// Turns about the x, then the y, then the z axis (degrees).
+    /// Rotations about the x, then the y, then the z axis (degrees).
     pub turn_deg: [f64; 3],
 }
 
@@ -255,13 +255,13 @@ pub struct Output {
     pub grains_ply: bool,
     /// `grains/grains.%04d.usda`.
     pub grains_usd: bool,
-    /// Whether most of the grains' .vdb files hold only the changes since the previous frame.
+    /// Whether the grains' .vdb files hold only the changes since the previous frame, except every 24th.
     pub grains_delta: bool,
     /// `mist/mist.%04d.vdb`.
     pub mist: bool,
     /// Volumes to render.
     pub volumes: VolumesOutput,
-    /// `objects/objects.%04d.usda`: the objects as they moved, with velocities.
+    /// `objects/objects.%04d.usda`: the moving objects, with velocities.
     pub objects_usd: bool,
     /// `objects/objects.%04d.ply`: the same, all in one mesh.
     pub objects_ply: bool,
@@ -367,7 +367,7 @@ impl Scene {
         part.ok_or_else(missing)
     }
 
-    /// The files that it reads; for sequences those of its own first frame.
+    /// The files that it reads; of sequences, those of the shot's first frame.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
         let mut out = Vec::new();
         if let Some(shallow) = &self.shallow {
@@ -419,7 +419,7 @@ impl Output {
         self.inexact_base().is_none()
     }
 
-    /// The key that leaves exact values of the base out of its files, if one does.
+    /// The key because of which the base's files lack its exact values, if there is one.
     pub(crate) fn inexact_base(&self) -> Option<&'static str> {
         match self {
             Self { half: true, .. } => Some("half"),

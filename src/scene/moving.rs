@@ -1,4 +1,4 @@
-//! Moving objects: the files of their sequences, and their names.
+//! Moving objects: the files of their sequences, and the names of their prims.
 
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ fn sequences(scene: &Scene) -> impl Iterator<Item = (Pattern, f64)> + '_ {
     moving.filter_map(|object| Some((Pattern::parse(&object.file)?, object.offset)))
 }
 
-/// The files of sequences that a frame's step reads: all that cover its time interval.
+/// The files of sequences that the step to a frame reads: all that cover its time interval.
 pub(super) fn files(scene: &Scene, frame: i32) -> Vec<PathBuf> {
     let mut out = Vec::new();
     for (pattern, offset) in sequences(scene) {
@@ -23,7 +23,7 @@ pub(super) fn files(scene: &Scene, frame: i32) -> Vec<PathBuf> {
     out
 }
 
-/// The files of sequences that are read only for a frame's velocities over the coming frame.
+/// The files of sequences that are read only for velocities over the frame after `frame`.
 pub(super) fn files_ahead(scene: &Scene, frame: i32) -> Vec<PathBuf> {
     let number = |offset: f64| (f64::from(frame) + 1.0 - offset).ceil() as i32;
     sequences(scene).map(|(pattern, offset)| pattern.path(number(offset))).collect()

@@ -41,9 +41,9 @@ impl<'a> Objects<'a> {
     /// All objects in one mesh.
     fn ply(&self, poses: &Poses, drawn: &[Drawn<'_>]) -> Vec<u8> {
         let (mut all, mut velocities) = (TriMesh::default(), Vec::new());
-        for (drawn, (positions, speeds)) in drawn.iter().zip(&poses.meshes) {
+        for (drawn, (positions, of_mesh)) in drawn.iter().zip(&poses.meshes) {
             all.append(&TriMesh { positions: positions.clone(), triangles: drawn.triangles.to_vec() });
-            velocities.extend_from_slice(speeds);
+            velocities.extend_from_slice(of_mesh);
         }
         let uvs = Uvs::joined(drawn.iter().map(|drawn| (drawn.uvs, drawn.vertices, drawn.triangles)));
         let carried = mesh::Carried { velocities: &velocities, uvs: uvs.as_ref(), arrays: &[] };

@@ -1,4 +1,4 @@
-//! Metadata that .vdb files have about their frame.
+//! Metadata of .vdb files about their frame.
 
 use super::Scene;
 use crate::vdb::MetaValue;

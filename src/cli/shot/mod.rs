@@ -63,16 +63,17 @@ impl ShotArgs {
     ) -> Result<(), Failure> {
         let run = Run::prepare(&session.ctx, pipeline, &self.output, stages, frames, self.from).before()?;
         output::check_folder(&self.output).before()?;
-        let (made, there) = (run.to_make(), run.there());
-        let shown = Mutex::new((FrameProgress::new(&session.ctx, made, there, session.is_quiet()), seen));
+        let (to_make, existing) = (run.to_make(), run.existing());
+        let shown =
+            Mutex::new((FrameProgress::new(&session.ctx, to_make, existing, session.is_quiet()), seen));
         run.make(&session.ctx, |stage, frame, report| {
             let mut shown = shown.lock().expect("nobody panics with this lock");
             (shown.1)(report);
             shown.0.finished(stage, frame);
         })
         .during()?;
-        session.record("frames", made.into());
-        session.record("frames_there", there.into());
+        session.record("frames", to_make.into());
+        session.record("frames_there", existing.into());
         Ok(())
     }
 }

@@ -1,11 +1,11 @@
-//! The frames of a stage in the output folder: the settings that they were made with, and which must be made again.
+//! The frames of a stage in the output folder, the settings that they were made with, and which of them must be made again.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::chain::{Chain, Made};
+use super::chain::{FrameHashes, HashChain};
 use super::done_frames::{DoneFrames, Resumable};
 use super::settings::{self, Settings};
 use super::stage::Stage;
@@ -21,7 +21,7 @@ use crate::scene::FrameChoice;
 struct Segment {
     from: i32,
     settings: Settings,
-    /// Hash of the settings, and of the frame before `from` as it was then.
+    /// Hash of the settings, and of the files of the frame before `from` when the segment began.
     seed: String,
 }
 
@@ -46,9 +46,9 @@ struct Record {
     segments: Vec<Segment>,
 }
 
-/// Which frames are requested.
+/// The frames that a run is asked for.
 #[derive(Clone, Copy)]
-pub struct Asked<'a> {
+pub struct Request<'a> {
     /// The shot's first frame.
     pub first: i32,
     /// The wanted frames.
@@ -57,9 +57,9 @@ pub struct Asked<'a> {
     pub from: Option<i32>,
 }
 
-impl Asked<'_> {
-    /// The request for a stage: one that was never made and whose frames are independent makes all wanted frames.
-    fn of(self, stage: &dyn Stage, stored: &DoneFrames) -> Self {
+impl Request<'_> {
+    /// The request for a stage. `from` does not apply to a stage without memory that has no frames: all wanted frames are made.
+    fn for_stage(self, stage: &dyn Stage, stored: &DoneFrames) -> Self {
         let is_new = !stage.has_memory() && stored.frames().next().is_none();
         Self { from: self.from.filter(|_| !is_new), ..self }
     }
@@ -70,9 +70,9 @@ pub struct Cache {
     /// The frames that are done, except those to be made again.
     pub stored: DoneFrames,
     record: Record,
-    chain: Chain,
-    /// Frames to be made again, removed by [`Cache::commit`].
-    forgotten: Vec<Manifest>,
+    chain: HashChain,
+    /// Frames to be made again, which [`Cache::commit`] removes.
+    to_remove: Vec<Manifest>,
 }
 
 impl Cache {
@@ -85,34 +85,34 @@ impl Cache {
         stage: &dyn Stage,
         input_hashes: &Arc<InputHashes>,
         folder: &Path,
-        asked: Asked<'_>,
+        request: Request<'_>,
     ) -> Result<Self> {
         let settings = stage.settings()?;
         let path = record_path(folder, stage);
         let mut record: Record = checksummed::read(&path)?.unwrap_or_default();
         let mut stored = DoneFrames::read(folder, stage.name())?;
-        refuse_asked(stage, asked, &stored)?;
-        let Asked { first, frames, from } = asked.of(stage, &stored);
-        let mut forgotten = Vec::new();
+        check_request(stage, request, &stored)?;
+        let Request { first, frames, from } = request.for_stage(stage, &stored);
+        let mut to_remove = Vec::new();
         match from {
             Some(from) if from > first => {
                 refuse_other_start(stage, folder, from, &record, &settings)?;
-                forgotten = stored.leave_out_from(from);
+                to_remove = stored.leave_out_from(from);
                 record.segments.retain(|segment| segment.from < from);
                 record.segments.push(Segment::new(from, settings, stored.manifest(from - 1)));
             }
             Some(_) => {
-                forgotten = stored.leave_out_from(first);
+                to_remove = stored.leave_out_from(first);
                 record.segments = vec![Segment::new(first, settings, None)];
             }
-            // A run that was refused before its first frame left a record of its settings.
+            // Without frames, a record is that of a run that ended before its first frame.
             None if stored.frames().next().is_none() => {
                 record.segments = vec![Segment::new(first, settings, None)];
             }
             None => match record.segments.last() {
                 Some(last) => {
                     let changed = settings::changed(&last.settings, &settings);
-                    // A checksummed record may still be one that no run wrote.
+                    // No run writes such a record, but its checksum may be valid.
                     if last.from < first {
                         let what = format!(
                             "says that frames from {} on were made, before the shot's first",
@@ -136,12 +136,12 @@ impl Cache {
             );
             return Err(Error::file(folder, what));
         }
-        let chain = Chain::new(input_hashes, last.from, &last.seed);
-        Ok(Self { stored, record, chain, forgotten })
+        let chain = HashChain::new(input_hashes, last.from, &last.seed);
+        Ok(Self { stored, record, chain, to_remove })
     }
 
-    /// Refuses a stage's frames that this run reads but does not make, if they were made with other settings or inputs. `upstream` has the
-    /// frames that they were made from.
+    /// Fails if a stage's frames, which this run reads but does not make, were made with other settings or inputs. `upstream` has the frames
+    /// that they were made from.
     ///
     /// # Errors
     /// The changed settings, or the frame whose inputs have changed; a damaged record; an input that cannot be read.
@@ -162,12 +162,12 @@ impl Cache {
         if !changed.is_empty() {
             return Err(stale(stage, folder, reader, &format!("other settings ({})", changed.join(", "))));
         }
-        let chain = Chain::new(input_hashes, last.from, &last.seed);
-        let mut cache = Self { stored, record, chain, forgotten: Vec::new() };
+        let chain = HashChain::new(input_hashes, last.from, &last.seed);
+        let mut cache = Self { stored, record, chain, to_remove: Vec::new() };
         match cache.first_changed(stage, &FrameChoice::none(), upstream)? {
             None => Ok(()),
             Some(frame) => {
-                let what = format!("other inputs from frame {frame} on ({})", read_by(stage, frame));
+                let what = format!("other inputs from frame {frame} on ({})", input_names(stage, frame));
                 Err(stale(stage, folder, reader, &what))
             }
         }
@@ -178,7 +178,7 @@ impl Cache {
     /// # Errors
     /// What the operating system reports.
     pub fn commit(&mut self, stage: &dyn Stage) -> Result<()> {
-        for manifest in std::mem::take(&mut self.forgotten) {
+        for manifest in std::mem::take(&mut self.to_remove) {
             self.stored.remove(&manifest)?;
         }
         let path = record_path(self.stored.folder(), stage);
@@ -188,55 +188,57 @@ impl Cache {
         Ok(())
     }
 
-    /// First frame that was made with the current settings.
+    /// First frame of those made with the current settings.
     pub fn own_from(&self) -> i32 {
         self.record.segments.last().map_or(i32::MIN, |segment| segment.from)
     }
 
-    /// What the stage can resume from in a shot that begins at frame `first`.
-    pub fn kept(&self, first: i32) -> Resumable<'_> {
+    /// The frames that the stage can resume from, in a shot that begins at frame `first`.
+    pub fn resumable(&self, first: i32) -> Resumable<'_> {
         Resumable { first, own_from: self.own_from(), done: &self.stored }
     }
 
-    /// Refuses frames whose inputs have changed since. A frame whose files of the coming frame have changed or appeared is made again if it
-    /// is requested.
+    /// Fails if the inputs of a frame have changed since it was made. If only its files of the coming frame ([`Reads::ahead`]) have changed
+    /// or appeared, and the frame is requested, it is left out, and so made again.
+    ///
+    /// [`Reads::ahead`]: super::stage::Reads::ahead
     ///
     /// # Errors
     /// The changed frame; a file that cannot be read.
     pub fn check_inputs(
         &mut self,
         stage: &dyn Stage,
-        asked: &FrameChoice,
+        requested: &FrameChoice,
         upstream: &[DoneFrames],
     ) -> Result<()> {
-        let Some(frame) = self.first_changed(stage, asked, upstream)? else { return Ok(()) };
+        let Some(frame) = self.first_changed(stage, requested, upstream)? else { return Ok(()) };
         let what = format!(
             "the inputs of frame {frame} have changed since it was made ({}): --from {frame} keeps the frames before it",
-            read_by(stage, frame)
+            input_names(stage, frame)
         );
         Err(Error::file(self.stored.folder(), what))
     }
 
-    /// The first frame with the current settings that was made from other inputs. Frames before it whose files of the coming frame have
-    /// changed are left out if they are requested.
+    /// The first frame with the current settings whose inputs have changed since it was made. Requested frames before it of which only the
+    /// files of the coming frame have changed are left out.
     fn first_changed(
         &mut self,
         stage: &dyn Stage,
-        asked: &FrameChoice,
+        requested: &FrameChoice,
         upstream: &[DoneFrames],
     ) -> Result<Option<i32>> {
         let own = self.own_from();
-        // An upstream frame that is not done may still be made in this run, and is checked then; or it is gone, and there is nothing to
-        // compare.
-        let is_read = |frame: &i32| *frame >= own && upstream.iter().all(|upstream| upstream.is_done(*frame));
-        let frames: Vec<i32> = self.stored.frames().filter(is_read).collect();
+        // A frame whose upstream frames are not all done cannot be compared. If they are made in this run, it is compared afterwards.
+        let is_comparable =
+            |frame: &i32| *frame >= own && upstream.iter().all(|upstream| upstream.is_done(*frame));
+        let frames: Vec<i32> = self.stored.frames().filter(is_comparable).collect();
         for frame in frames {
-            let made = self.inputs(stage, frame, upstream)?;
+            let hashes = self.hashes(stage, frame, upstream)?;
             let Some(manifest) = self.stored.manifest(frame) else { continue };
-            if manifest.inputs != made.from {
+            if manifest.inputs != hashes.inputs {
                 return Ok(Some(frame));
             }
-            if manifest.next != made.next && asked.contains(frame) {
+            if manifest.next != hashes.next && requested.contains(frame) {
                 self.stored.leave_out(frame);
             }
         }
@@ -247,12 +249,12 @@ impl Cache {
     ///
     /// # Errors
     /// A file that cannot be read.
-    pub fn inputs(&mut self, stage: &dyn Stage, frame: i32, upstream: &[DoneFrames]) -> Result<Made> {
+    pub fn hashes(&mut self, stage: &dyn Stage, frame: i32, upstream: &[DoneFrames]) -> Result<FrameHashes> {
         self.chain.at(stage, frame, &self.stored, upstream)
     }
 }
 
-/// Refuses to keep frames that began with another first state.
+/// Fails if the frames to be kept began with another first state.
 fn refuse_other_start(
     stage: &dyn Stage,
     folder: &Path,
@@ -260,9 +262,13 @@ fn refuse_other_start(
     record: &Record,
     settings: &Settings,
 ) -> Result<()> {
-    let Some(kept) = record.segments.iter().rev().find(|segment| segment.from < from) else { return Ok(()) };
-    let changed =
-        settings::changed(&stage.first_state_settings(&kept.settings), &stage.first_state_settings(settings));
+    let Some(last_kept) = record.segments.iter().rev().find(|segment| segment.from < from) else {
+        return Ok(());
+    };
+    let changed = settings::changed(
+        &stage.first_state_settings(&last_kept.settings),
+        &stage.first_state_settings(settings),
+    );
     if changed.is_empty() {
         return Ok(());
     }
@@ -274,15 +280,15 @@ fn refuse_other_start(
     Err(Error::file(folder, what))
 }
 
-/// Refuses a `from` that cannot resume after the frame before it, or that lies beyond all requested frames; and gaps between frames, if the
-/// stage allows none.
+/// Checks a request.
 ///
 /// # Errors
-/// The reason.
-pub(super) fn refuse_asked(stage: &dyn Stage, asked: Asked<'_>, stored: &DoneFrames) -> Result<()> {
-    let Asked { first, frames, from } = asked.of(stage, stored);
+/// A `from` that cannot resume after the frame before it, or that lies beyond all requested frames; a gap between frames, if the stage
+/// allows none.
+pub(super) fn check_request(stage: &dyn Stage, request: Request<'_>, stored: &DoneFrames) -> Result<()> {
+    let Request { first, frames, from } = request.for_stage(stage, stored);
     if let Some(from) = from {
-        refuse_from(stage, frames, first, from, stored)?;
+        check_from(stage, frames, first, from, stored)?;
     }
     let Some(why) = stage.needs_every_frame() else { return Ok(()) };
     let is_there = |frame: i32| stored.is_done(frame) && from.is_none_or(|from| frame < from);
@@ -295,7 +301,7 @@ pub(super) fn refuse_asked(stage: &dyn Stage, asked: Asked<'_>, stored: &DoneFra
     }
 }
 
-fn refuse_from(
+fn check_from(
     stage: &dyn Stage,
     frames: &FrameChoice,
     first: i32,
@@ -322,10 +328,10 @@ fn refuse_from(
             .filter(|frame| *frame < frames.last() && stored.latest_state(*frame..=*frame).is_some())
             .map(|frame| format!("--from {}", i64::from(frame) + 1))
             .collect();
-        let ways = if kept.is_empty() { String::new() } else { format!("{}, ", kept.join(", ")) };
+        let alternatives = if kept.is_empty() { String::new() } else { format!("{}, ", kept.join(", ")) };
         return refused(format!(
             "--from {from} needs the exact {} after frame {before}, which the folder does not keep ({}): \
-             {ways}--from {first} or another -o",
+             {alternatives}--from {first} or another -o",
             stage.noun(),
             stage.why_states_are_missing()
         ));
@@ -343,8 +349,8 @@ fn record_path(folder: &Path, stage: &dyn Stage) -> PathBuf {
     folder.join("state").join(format!("{}.json", stage.name()))
 }
 
-/// The inputs of a frame of a stage, for messages.
-fn read_by(stage: &dyn Stage, frame: i32) -> String {
+/// Names of a frame's inputs, for messages.
+fn input_names(stage: &dyn Stage, frame: i32) -> String {
     let mut names: Vec<String> =
         stage.reads(frame).files.iter().map(|file| file.display().to_string()).collect();
     names.extend(stage.upstream().iter().map(|upstream| format!("stage {upstream}")));

@@ -1,5 +1,5 @@
-//! The inputs of each frame of a stage, as a hash: of the settings, of every file that it reads, of the upstream frames and, for stages
-//! with memory, of the frames before it.
+//! A hash of the inputs of each frame of a stage: of the settings, of every file that it reads, of the upstream frames and, for stages with
+//! memory, of the frames before it.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,23 +12,23 @@ use crate::io::records::input_hashes::InputHashes;
 use crate::io::records::manifest::{Manifest, Written};
 
 /// Hashes of consecutive frames.
-pub(super) struct Chain {
+pub(super) struct HashChain {
     first: i32,
-    /// The hash of the start, then that of each frame requested so far.
+    /// The hash of the seed, then that of each frame requested so far.
     links: Vec<String>,
     input_hashes: Arc<InputHashes>,
 }
 
 /// Hashes of a frame's inputs.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Made {
+pub struct FrameHashes {
     /// The settings, the files and upstream frames that it reads, and the frames before it.
-    pub from: String,
-    /// The files of the coming frame that it reads, as far as they exist; `None` if it reads no such files.
+    pub inputs: String,
+    /// The files of the coming frame that it reads, if they exist; `None` if it reads no such files.
     pub next: Option<String>,
 }
 
-impl Chain {
+impl HashChain {
     /// A chain whose first link is for frame `first` and depends on `seed`.
     pub fn new(input_hashes: &Arc<InputHashes>, first: i32, seed: &str) -> Self {
         let mut start = Hasher::default();
@@ -36,8 +36,8 @@ impl Chain {
         Self { first, links: vec![start.finish()], input_hashes: input_hashes.clone() }
     }
 
-    /// The inputs of a frame; a frame before the first depends on the seed alone. If an upstream frame no longer exists, the stage's own
-    /// record of it counts.
+    /// The hashes of a frame; one before the first depends on the seed alone. If an upstream frame no longer exists, the hash in the stage's
+    /// own record counts.
     ///
     /// # Errors
     /// A file that cannot be read; a frame that is neither done nor has all its inputs.
@@ -47,8 +47,8 @@ impl Chain {
         frame: i32,
         own: &DoneFrames,
         upstream: &[DoneFrames],
-    ) -> Result<Made> {
-        let from = if stage.has_memory() {
+    ) -> Result<FrameHashes> {
+        let inputs = if stage.has_memory() {
             let wanted = (i64::from(frame) - i64::from(self.first)).max(-1) + 1;
             while (self.links.len() as i64) <= wanted {
                 let next = self.first + (self.links.len() - 1) as i32;
@@ -59,7 +59,7 @@ impl Chain {
         } else {
             self.link(&self.links[0], stage, frame, own, upstream)?
         };
-        Ok(Made { from, next: self.next(&stage.reads(frame).ahead)? })
+        Ok(FrameHashes { inputs, next: self.next(&stage.reads(frame).ahead)? })
     }
 
     fn link(
@@ -77,7 +77,7 @@ impl Chain {
                 let recorded = own.manifest(frame).map(|manifest| manifest.inputs.clone());
                 return recorded.ok_or_else(|| missing(stage, frame, name, stored.folder()));
             };
-            // The meaning of a file of changes depends on the frames before it; stages with memory already have links for those.
+            // A file of changes depends on the frames before it, which the links of stages with memory already cover.
             if !stage.has_memory() {
                 link.add_text(&manifest.inputs);
             }

@@ -1,4 +1,4 @@
-//! The frames of a stage in a folder: which are done, and which files the state after one can be read from.
+//! The frames of a stage that are done, and the files from which the state after one of them can be read.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::io::records::checksummed;
 use crate::io::records::manifest::{Keeps, Manifest, Written};
 
-/// The frames of a stage in a folder.
+/// The frames of a stage that are done in a folder, with their records.
 pub struct DoneFrames {
     folder: PathBuf,
     stage: String,
@@ -18,17 +18,18 @@ pub struct DoneFrames {
 }
 
 impl DoneFrames {
-    /// Reads the records of a stage in a folder; frames whose files are missing or have another length are not done; a folder without
+    /// Reads the records of a stage in a folder. Frames whose files are missing or have another length are not done; a folder without
     /// records has no frames.
     ///
     /// # Errors
     /// A folder that cannot be read; a record that is damaged or of a newer version.
     pub fn read(folder: &Path, stage: &str) -> Result<Self> {
         let mut done = BTreeMap::new();
-        for name in names_in(&folder.join("state"))? {
-            let Some((_, frame)) = record_of(&name).filter(|(of, _)| *of == stage) else { continue };
+        for name in file_names(&folder.join("state"))? {
+            let Some((_, frame)) = parse_record_name(&name).filter(|(of, _)| *of == stage) else { continue };
             let manifest = Manifest::read(folder, stage, frame)?;
-            done.extend(manifest.filter(|own| own.files_are_there(folder)).map(|own| (frame, own)));
+            let manifest = manifest.filter(|manifest| manifest.files_are_there(folder));
+            done.extend(manifest.map(|manifest| (frame, manifest)));
         }
         Ok(Self { folder: folder.to_path_buf(), stage: stage.to_string(), done })
     }
@@ -76,7 +77,7 @@ impl DoneFrames {
         self.done.remove(&frame);
     }
 
-    /// Removes a frame that was left out: first the record, then its files.
+    /// Removes the files of a frame that was left out, its record first.
     ///
     /// # Errors
     /// What the operating system reports.
@@ -95,21 +96,21 @@ impl DoneFrames {
         Ok(())
     }
 
-    /// The latest frame in a range after which the state can be read.
+    /// The latest frame in a range whose state can be read.
     pub fn latest_state(&self, frames: RangeInclusive<i32>) -> Option<i32> {
         if frames.is_empty() {
             return None;
         }
-        let (mut latest, mut before) = (None, None);
+        let (mut latest, mut previous) = (None, None);
         for (&frame, manifest) in self.done.range(..=frames.end()) {
-            let loads = match manifest.keeps {
+            let is_readable = match manifest.keeps {
                 Keeps::Whole => true,
-                Keeps::Changes => before == Some(frame - 1),
+                Keeps::Changes => previous == Some(frame - 1),
                 Keeps::State => manifest.state.as_ref().is_some_and(|state| state.is_there(&self.folder)),
             };
-            if loads {
-                before = Some(frame);
-                latest = before.filter(|frame| frames.contains(frame)).or(latest);
+            if is_readable {
+                previous = Some(frame);
+                latest = previous.filter(|frame| frames.contains(frame)).or(latest);
             }
         }
         latest
@@ -120,11 +121,11 @@ impl DoneFrames {
         self.done.get(&frame).is_some_and(|manifest| manifest.keeps == Keeps::Changes)
     }
 
-    /// The frames whose files make up the state after a frame: a whole one, and all later ones up to it, which store changes.
+    /// The frames whose files make up the state after a frame: the last whole one, and those after it, which store changes.
     ///
     /// # Errors
     /// A missing frame.
-    pub fn frames_to(&self, frame: i32) -> Result<RangeInclusive<i32>> {
+    pub fn frames_of_state(&self, frame: i32) -> Result<RangeInclusive<i32>> {
         let whole = (0..).map(|back| frame - back).find(|&frame| !self.keeps_changes(frame));
         let whole = whole.filter(|whole| self.is_done(*whole));
         let missing = || Error::file(&self.folder, format!("frame {frame} cannot be had from its files"));
@@ -134,7 +135,7 @@ impl DoneFrames {
     /// The report of a frame that is done; `None` if it is gone.
     ///
     /// # Errors
-    /// A report that is not what was written.
+    /// A report that differs from what was written.
     pub fn report(&self, frame: i32) -> Result<Option<Value>> {
         let path = self.folder.join("report").join(format!("{}.{frame:04}.json", self.stage));
         let bytes = match std::fs::read(&path) {
@@ -145,10 +146,10 @@ impl DoneFrames {
         report.map(Some).ok_or_else(|| Error::file(path, "is not the report that was written"))
     }
 
-    /// The file with the state after a frame, or with its changes; the content was verified.
+    /// The file with the state after a frame, or with the frame's changes; its content is verified.
     ///
     /// # Errors
-    /// A missing frame; a file that is not what was written.
+    /// A missing frame; a file that differs from what was written.
     pub fn state_file(&self, frame: i32) -> Result<PathBuf> {
         let missing = || Error::file(&self.folder, format!("frame {frame} is not there"));
         let manifest = self.done.get(&frame).ok_or_else(missing)?;
@@ -156,46 +157,46 @@ impl DoneFrames {
             Keeps::State => manifest.state.as_ref(),
             Keeps::Whole | Keeps::Changes => manifest.files_of(&self.stage).next(),
         };
-        self.compared(written.ok_or_else(missing)?)
+        self.verified(written.ok_or_else(missing)?)
     }
 
     /// Resumes from the exact state after a frame.
     ///
     /// # Errors
-    /// As [`DoneFrames::state_file`]; what `resume` refuses, with the name of the file.
+    /// As [`DoneFrames::state_file`]; errors of `resume`, with the name of the file.
     pub fn resume<T>(&self, frame: i32, resume: impl FnOnce(&[u8]) -> Result<T>) -> Result<T> {
         let path = self.state_file(frame)?;
         let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
         resume(&bytes).map_err(|error| Error::file(path, error.to_string()))
     }
 
-    /// A frame's file of a kind; the content was verified.
+    /// A frame's file of a kind; its content is verified.
     ///
     /// # Errors
-    /// A missing frame or one without such a file; a file that is not what was written.
+    /// A missing frame or one without such a file; a file that differs from what was written.
     pub fn file(&self, frame: i32, kind: &str) -> Result<PathBuf> {
         self.find(frame, kind, |_| true)
     }
 
-    /// A frame's file of a kind with an extension; the content was verified.
+    /// A frame's file of a kind with an extension; its content is verified.
     ///
     /// # Errors
     /// As [`DoneFrames::file`].
     pub fn file_with(&self, frame: i32, kind: &str, extension: &str) -> Result<PathBuf> {
         self.find(frame, kind, |written| {
-            Path::new(&written.path).extension().is_some_and(|is| is == extension)
+            Path::new(&written.path).extension().is_some_and(|own| own == extension)
         })
     }
 
-    fn find(&self, frame: i32, kind: &str, is_it: impl Fn(&Written) -> bool) -> Result<PathBuf> {
+    fn find(&self, frame: i32, kind: &str, matches: impl Fn(&Written) -> bool) -> Result<PathBuf> {
         let manifest = self.done.get(&frame);
-        let written = manifest.and_then(|manifest| manifest.files_of(kind).find(|written| is_it(written)));
+        let written = manifest.and_then(|manifest| manifest.files_of(kind).find(|written| matches(written)));
         let missing = || Error::file(&self.folder, format!("frame {frame} has no file in {kind}/"));
-        self.compared(written.ok_or_else(missing)?)
+        self.verified(written.ok_or_else(missing)?)
     }
 
-    /// The path of a file whose content is what was written.
-    fn compared(&self, written: &Written) -> Result<PathBuf> {
+    /// The path of a file, after its content was compared with what was written.
+    fn verified(&self, written: &Written) -> Result<PathBuf> {
         let path = self.folder.join(&written.path);
         match written.fault(&self.folder) {
             Some(fault) => Err(Error::file(path, format!("{fault}: remove it, and it is made again"))),
@@ -208,7 +209,7 @@ impl DoneFrames {
 ///
 /// # Errors
 /// A folder that cannot be read.
-pub(super) fn names_in(folder: &Path) -> Result<Vec<String>> {
+pub(super) fn file_names(folder: &Path) -> Result<Vec<String>> {
     let refused = |error| Error::io(folder, "read", error);
     let entries = match std::fs::read_dir(folder) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
@@ -221,18 +222,18 @@ pub(super) fn names_in(folder: &Path) -> Result<Vec<String>> {
     Ok(out)
 }
 
-/// The stage and frame of a record, by its name in `state/`: `base.0012.json`.
-pub(super) fn record_of(name: &str) -> Option<(&str, i32)> {
+/// The stage and frame of a record by its file name in `state/`, such as `base.0012.json`.
+pub(super) fn parse_record_name(name: &str) -> Option<(&str, i32)> {
     let (stage, number) = name.strip_suffix(".json")?.split_once('.')?;
     Some((stage, number.parse().ok()?))
 }
 
-/// What a stage can resume from.
+/// The frames that a stage can resume from.
 #[derive(Clone, Copy)]
 pub struct Resumable<'a> {
     /// The shot's first frame.
     pub first: i32,
-    /// First frame that was made with the current settings.
+    /// First frame of those made with the current settings.
     pub own_from: i32,
     /// The frames that are done.
     pub done: &'a DoneFrames,

@@ -1,10 +1,10 @@
 //! Shots: the frame loop that runs any stage over its frames, and the resulting folder.
 //!
-//! A shot is made by stages ([`Stage`]), one pass over the frames each. Every stage has its own records, so that it is made again only if
-//! something that it depends on has changed: its settings (`settings.rs`), the files that a frame reads and the frames of stages upstream
-//! of it (`chain.rs`). A frame is done when its record exists ([`DoneFrames`]); `cache.rs` knows which frames belong to which settings,
-//! `run/own_files.rs` which files of the folder are its own. `runner.rs` drives everything; [`verify`] compares a folder with its records,
-//! `usd.rs` describes the shot to other programs.
+//! A shot is made by stages ([`Stage`]), each in one pass over the frames (`pass.rs`); a [`Pipeline`] lists the stages of a scene. Every
+//! stage has its own records, so that it is made again only if something that it depends on has changed: its settings (`settings.rs`), the
+//! files that a frame reads and the frames of stages upstream of it (`chain.rs`). A frame is done when its record exists
+//! ([`DoneFrames`]). `cache.rs` knows which frames were made with which settings, `own_files.rs` which files of the folder may be
+//! overwritten. [`Run`] drives everything, [`verify`] compares a folder with its records, `usd.rs` describes the shot to other programs.
 
 mod cache;
 mod chain;

@@ -1,11 +1,11 @@
-//! Which files of an output folder are its own: all others are never overwritten or removed.
+//! Which files of an output folder runs have written: all others are never overwritten or removed.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::done_frames::{names_in, record_of};
+use super::done_frames::{file_names, parse_record_name};
 use super::pipeline::Pipeline;
 use super::stage::Stage;
 use crate::error::{Error, Result};
@@ -15,21 +15,21 @@ use crate::scene::FrameChoice;
 
 /// The scene with its defaults.
 pub(super) const SCENE: &str = "scene.toml";
-/// File written by this module: see [`Files`].
+/// File of a [`FolderRecord`].
 const FILES: &str = "files.json";
 
 /// What runs have written into a folder besides the records of frames: `state/files.json`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-struct Files {
+struct FolderRecord {
     /// The stages that runs have started, by name.
-    stages: BTreeMap<String, Begun>,
+    stages: BTreeMap<String, StartedStage>,
     /// Hashes of the files that belong to no frame, by path: the current content, then the previous one while it is being replaced.
     files: BTreeMap<String, Vec<String>>,
 }
 
 /// A stage that runs have started.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-struct Begun {
+struct StartedStage {
     /// Its folders, with the extensions of their files.
     kinds: BTreeMap<String, Vec<String>>,
     /// Extension of its exact states.
@@ -38,45 +38,49 @@ struct Begun {
     frames: Option<[i32; 2]>,
 }
 
-impl Begun {
+impl StartedStage {
     fn of(stage: &dyn Stage) -> Self {
         let extensions = |all: &[&str]| all.iter().map(|extension| extension.to_string()).collect();
         let kinds = stage.kinds().iter().map(|kind| (kind.name.to_string(), extensions(kind.extensions)));
         Self { kinds: kinds.collect(), state: stage.state_extension().to_string(), frames: None }
     }
 
-    fn holds(&self, frame: i32) -> bool {
+    fn has_started(&self, frame: i32) -> bool {
         self.frames.is_some_and(|[low, high]| (low..=high).contains(&frame))
     }
 }
 
-/// The files that belong to a folder.
-pub(super) struct Own {
+/// The files of an output folder that runs have written.
+pub(super) struct OwnFiles {
     folder: PathBuf,
-    /// Everything known about the folder: its own record, and the stages of the run.
-    known: Files,
-    written: Option<Files>,
+    /// The folder's record, with the stages of the current run.
+    known: FolderRecord,
+    /// The record as it is on disk.
+    /// The record as it is on disk.
+    written: Option<FolderRecord>,
 }
 
-impl Own {
+impl OwnFiles {
     /// Reads a folder's own record; `stages` are those of the current run.
     ///
     /// # Errors
     /// A damaged record.
     pub fn read<'s>(folder: &Path, stages: impl Iterator<Item = &'s dyn Stage>) -> Result<Self> {
         let folder = folder.to_path_buf();
-        let written: Option<Files> = checksummed::read(&folder.join("state").join(FILES))?;
+        let written: Option<FolderRecord> = checksummed::read(&folder.join("state").join(FILES))?;
         let mut known = written.clone().unwrap_or_default();
         for stage in stages {
-            let before = known.stages.remove(stage.name()).and_then(|begun| begun.frames);
-            known.stages.insert(stage.name().to_string(), Begun { frames: before, ..Begun::of(stage) });
+            let before = known.stages.remove(stage.name()).and_then(|started| started.frames);
+            known
+                .stages
+                .insert(stage.name().to_string(), StartedStage { frames: before, ..StartedStage::of(stage) });
         }
         Ok(Self { folder, known, written })
     }
 
-    /// A folder of which nothing is known.
+    /// A folder without a record.
     pub fn unknown(folder: &Path) -> Self {
-        Self { folder: folder.to_path_buf(), known: Files::default(), written: None }
+        Self { folder: folder.to_path_buf(), known: FolderRecord::default(), written: None }
     }
 
     /// Its path.
@@ -85,18 +89,17 @@ impl Own {
     }
 
     /// The files that belong to no frame, by path relative to the folder.
-    pub fn loose(&self) -> impl Iterator<Item = &str> {
+    pub fn shot_files(&self) -> impl Iterator<Item = &str> {
         self.known.files.keys().map(String::as_str)
     }
 
-    /// Refuses to start frames, or to write files that belong to no frame, over files that are not the folder's own; inputs of the scene
-    /// never are.
+    /// Fails if the run would overwrite a file that no run wrote, or an input of the scene.
     ///
     /// # Errors
     /// The file that would be overwritten.
     pub fn refuse_foreign(&self, pipeline: &Pipeline, frames: &FrameChoice) -> Result<()> {
         for input in pipeline.scene.files() {
-            if input.parent().is_some_and(|folder| self.holds(folder, &input)) {
+            if input.parent().is_some_and(|folder| self.writes_to(folder, &input)) {
                 let what = "is an input of the scene and would be written over: choose another -o";
                 return Err(Error::file(input, what));
             }
@@ -108,30 +111,31 @@ impl Own {
             return Err(Error::file(&scene.path, what));
         }
         if scene.output.usd {
-            self.refuse_changed(SHOT, None)?;
+            self.refuse_changed(SHOT_USD, None)?;
             let kinds = pipeline.stages().filter_map(|stage| stage.usd_kind());
-            kinds.map(manifest_of).try_for_each(|name| self.refuse_changed(&name, None))?;
+            kinds.map(usd_manifest).try_for_each(|name| self.refuse_changed(&name, None))?;
         }
         self.refuse_changed(SCENE, Some(&new))?;
-        let asked = frames.first()..=frames.last();
-        let is_foreign = |own: &OfFrame| {
-            let is_begun = self.known.stages.get(&own.stage).is_some_and(|begun| begun.holds(own.frame));
-            asked.contains(&own.frame) && !is_begun
+        let requested = frames.first()..=frames.last();
+        let is_foreign = |own: &FrameFile| {
+            let is_started =
+                self.known.stages.get(&own.stage).is_some_and(|started| started.has_started(own.frame));
+            requested.contains(&own.frame) && !is_started
         };
         let names = self.names()?;
         let foreign = names.iter().find(|(_, frame)| frame.as_ref().is_some_and(is_foreign));
         foreign.map_or(Ok(()), |(path, _)| Err(self.foreign(path)))
     }
 
-    /// Refuses an existing file that is neither what was written nor, if given, what is about to be written.
+    /// Fails if a file exists that is neither what a run wrote nor `new`, the hash of what is about to be written.
     fn refuse_changed(&self, name: &str, new: Option<&str>) -> Result<()> {
         let path = self.folder.join(name);
         if !path.exists() {
             return Ok(());
         }
-        let there = hash::of_file(&path)?;
-        let own = self.known.files.get(name).is_some_and(|hashes| hashes.contains(&there));
-        if own || new == Some(there.as_str()) { Ok(()) } else { Err(self.foreign(name)) }
+        let found = hash::of_file(&path)?;
+        let own = self.known.files.get(name).is_some_and(|hashes| hashes.contains(&found));
+        if own || new == Some(found.as_str()) { Ok(()) } else { Err(self.foreign(name)) }
     }
 
     fn foreign(&self, name: &str) -> Error {
@@ -140,20 +144,20 @@ impl Own {
     }
 
     /// Whether runs write to a path in a folder.
-    fn holds(&self, folder: &Path, path: &Path) -> bool {
+    fn writes_to(&self, folder: &Path, path: &Path) -> bool {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let mut folders = self.folders().into_iter();
         folders.any(|kind| self.is_own(&kind, &name) && is_same(folder, &self.folder.join(kind)))
     }
 
-    /// Records that frames of a stage are started.
+    /// Records that frames of a stage will be written.
     ///
     /// # Errors
     /// What the operating system reports.
-    pub fn begin(&mut self, stage: &str, first: i32, last: i32) -> Result<()> {
-        let begun = self.known.stages.entry(stage.to_string()).or_default();
-        let [low, high] = begun.frames.unwrap_or([first, last]);
-        begun.frames = Some([low.min(first), high.max(last)]);
+    pub fn record_started(&mut self, stage: &str, first: i32, last: i32) -> Result<()> {
+        let started = self.known.stages.entry(stage.to_string()).or_default();
+        let [low, high] = started.frames.unwrap_or([first, last]);
+        started.frames = Some([low.min(first), high.max(last)]);
         self.save()
     }
 
@@ -165,7 +169,7 @@ impl Own {
         let (path, new) = (self.folder.join(name), hash::of_bytes(bytes));
         let hashes = self.known.files.entry(name.to_string()).or_default();
         if hashes.first() != Some(&new) {
-            // Recorded first: if the run is killed at any moment, the file is still recognised as the folder's own.
+            // Recorded first, so that the file is recognised even if the run is killed after writing it.
             hashes.retain(|hash| *hash != new);
             hashes.insert(0, new.clone());
             self.save()?;
@@ -176,7 +180,7 @@ impl Own {
         atomic::write_bytes(&path, bytes)
     }
 
-    /// Forgets the previous contents of replaced files: the run is over.
+    /// Forgets the previous contents of replaced files, at the end of a run.
     ///
     /// # Errors
     /// What the operating system reports.
@@ -193,7 +197,7 @@ impl Own {
         Ok(())
     }
 
-    /// The number of files that belong to no frame, and the faults of those that are not what was written, by path.
+    /// The number of files that belong to no frame, and the paths and faults of those that differ from what was written.
     pub fn faults(&self) -> (usize, Vec<(String, String)>) {
         let fault = |(name, hashes): (&String, &Vec<String>)| {
             let path = self.folder.join(name);
@@ -209,54 +213,54 @@ impl Own {
 
     /// Folders that runs write into, relative to the output folder, which itself is "".
     fn folders(&self) -> Vec<String> {
-        let kinds = self.known.stages.values().flat_map(|begun| begun.kinds.keys().cloned());
+        let kinds = self.known.stages.values().flat_map(|started| started.kinds.keys().cloned());
         ["", "state", "report"].into_iter().map(String::from).chain(kinds).collect()
     }
 
     /// Whether runs write files of this name into a folder.
     fn is_own(&self, folder: &str, name: &str) -> bool {
-        let alone = match folder {
-            "" => [SCENE, SHOT].contains(&name),
+        let is_shot_file = match folder {
+            "" => [SCENE, SHOT_USD].contains(&name),
             "state" => name == FILES || name.strip_suffix(".json").is_some_and(|name| self.has_stage(name)),
             kind => self.known.files.contains_key(&format!("{kind}/{name}")),
         };
-        alone || self.frame_of(folder, name).is_some()
+        is_shot_file || self.frame_of(folder, name).is_some()
     }
 
     fn has_stage(&self, name: &str) -> bool {
         self.known.stages.contains_key(name)
     }
 
-    /// The frame of a file in a folder, if its name is one that runs give to a frame's file.
-    fn frame_of(&self, folder: &str, name: &str) -> Option<OfFrame> {
+    /// The stage and frame of a file in a folder, if it is named like a frame's file.
+    fn frame_of(&self, folder: &str, name: &str) -> Option<FrameFile> {
         let (before, rest) = name.split_once('.')?;
         let (number, extension) = rest.rsplit_once('.')?;
         let frame = number.parse::<i32>().ok().filter(|frame| format!("{frame:04}") == number)?;
         let stage = match folder {
             "state" => {
-                let begun = self.known.stages.get(before)?;
-                (extension == "json" || extension == begun.state).then_some(before)?
+                let started = self.known.stages.get(before)?;
+                (extension == "json" || extension == started.state).then_some(before)?
             }
             "report" => (extension == "json" && self.has_stage(before)).then_some(before)?,
             kind if kind == before => {
-                let writes = |begun: &Begun| {
-                    begun.kinds.get(kind).is_some_and(|known| known.iter().any(|known| known == extension))
+                let writes = |started: &StartedStage| {
+                    started.kinds.get(kind).is_some_and(|known| known.iter().any(|known| known == extension))
                 };
-                self.known.stages.iter().find(|(_, begun)| writes(begun))?.0
+                self.known.stages.iter().find(|(_, started)| writes(started))?.0
             }
             _ => return None,
         };
-        Some(OfFrame { stage: stage.to_string(), frame })
+        Some(FrameFile { stage: stage.to_string(), frame })
     }
 
-    /// All existing files with names that runs give, by path relative to the folder; those of frames with their frames.
+    /// All existing files that are named like those of runs, by path relative to the folder; files of frames with stage and frame.
     ///
     /// # Errors
     /// A folder that cannot be read.
-    pub fn names(&self) -> Result<BTreeMap<String, Option<OfFrame>>> {
+    pub fn names(&self) -> Result<BTreeMap<String, Option<FrameFile>>> {
         let mut out = BTreeMap::new();
         for kind in self.folders() {
-            for name in names_in(&self.folder.join(&kind))? {
+            for name in file_names(&self.folder.join(&kind))? {
                 if self.is_own(&kind, &name) {
                     let path = if kind.is_empty() { name.clone() } else { format!("{kind}/{name}") };
                     out.insert(path, self.frame_of(&kind, &name));
@@ -266,25 +270,25 @@ impl Own {
         Ok(out)
     }
 
-    /// The names of [`Own::names`], and those of these stages' records if the folder does not know the stages.
+    /// As [`OwnFiles::names`], with the records of these stages even if the folder's record does not list the stages.
     ///
     /// # Errors
     /// A folder that cannot be read.
     pub fn names_of(&self, stages: &[String]) -> Result<BTreeSet<String>> {
         let is_of = |name: &String| {
-            record_of(name).is_some_and(|(stage, _)| stages.iter().any(|known| known == stage))
+            parse_record_name(name).is_some_and(|(stage, _)| stages.iter().any(|known| known == stage))
         };
-        let records = names_in(&self.folder.join("state"))?.into_iter().filter(is_of);
+        let records = file_names(&self.folder.join("state"))?.into_iter().filter(is_of);
         Ok(self.names()?.into_keys().chain(records.map(|name| format!("state/{name}"))).collect())
     }
 
-    /// Removes files that a killed run left unfinished: no other run is writing now.
+    /// Removes files that a killed run left unfinished; no other run may be writing.
     ///
     /// # Errors
     /// What the operating system reports.
     pub fn remove_unfinished(&self) -> Result<()> {
         for kind in self.folders() {
-            for part in names_in(&self.folder.join(&kind))? {
+            for part in file_names(&self.folder.join(&kind))? {
                 if atomic::finished_name(&part).is_some_and(|finished| self.is_own(&kind, finished)) {
                     let path = self.folder.join(&kind).join(&part);
                     std::fs::remove_file(&path).map_err(|error| Error::io(path, "remove", error))?;
@@ -294,13 +298,13 @@ impl Own {
         Ok(())
     }
 
-    /// The stages of which a folder has records, even if its own record does not list them.
+    /// The stages of the folder's record and those of which it has records of frames.
     ///
     /// # Errors
     /// A folder that cannot be read.
-    pub fn stages_there(&self) -> Result<Vec<String>> {
-        let names = names_in(&self.folder.join("state"))?;
-        let of_records = names.iter().filter_map(|name| Some(record_of(name)?.0.to_string()));
+    pub fn recorded_stages(&self) -> Result<Vec<String>> {
+        let names = file_names(&self.folder.join("state"))?;
+        let of_records = names.iter().filter_map(|name| Some(parse_record_name(name)?.0.to_string()));
         let all: BTreeSet<String> = self.known.stages.keys().cloned().chain(of_records).collect();
         Ok(all.into_iter().collect())
     }
@@ -308,7 +312,7 @@ impl Own {
 
 /// A file of a frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct OfFrame {
+pub(super) struct FrameFile {
     /// The stage that writes it.
     pub stage: String,
     /// Which frame.
@@ -317,25 +321,25 @@ pub(super) struct OfFrame {
 
 /// Whether two paths lead to the same file or folder.
 fn is_same(a: &Path, b: &Path) -> bool {
-    let there = |path| std::fs::canonicalize(path).ok();
-    there(a).is_some_and(|a| there(b) == Some(a))
+    let canonical = |path| std::fs::canonicalize(path).ok();
+    canonical(a).is_some_and(|a| canonical(b) == Some(a))
 }
 
-/// The manifest that the .usda files of a kind share.
-pub(in crate::scene::run) fn manifest_of(kind: &str) -> String {
+/// Path of the manifest that the .usda files of a kind share.
+pub(in crate::scene::run) fn usd_manifest(kind: &str) -> String {
     format!("{kind}/{kind}.manifest.usda")
 }
 
-/// The shot for programs that read USD.
-pub(in crate::scene::run) const SHOT: &str = "shot.usda";
+/// Name of the file that describes the shot to programs that read USD.
+pub(in crate::scene::run) const SHOT_USD: &str = "shot.usda";
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn only_names_that_runs_give_are_their_own() {
-        let begun = |kinds: &[(&str, &[&str])], state: &str| Begun {
+    fn files_are_own_if_named_like_those_of_runs() {
+        let started = |kinds: &[(&str, &[&str])], state: &str| StartedStage {
             kinds: kinds
                 .iter()
                 .map(|(kind, all)| (kind.to_string(), all.iter().map(|name| name.to_string()).collect()))
@@ -344,11 +348,11 @@ mod tests {
             frames: None,
         };
         let stages = BTreeMap::from([
-            ("base".to_string(), begun(&[("base", &["vdb"])], "vdb")),
-            ("objects".to_string(), begun(&[("objects", &["usda", "ply"])], "txt")),
+            ("base".to_string(), started(&[("base", &["vdb"])], "vdb")),
+            ("objects".to_string(), started(&[("objects", &["usda", "ply"])], "txt")),
         ]);
         let files = BTreeMap::from([("objects/objects.manifest.usda".to_string(), Vec::new())]);
-        let own = Own { folder: PathBuf::new(), known: Files { stages, files }, written: None };
+        let own = OwnFiles { folder: PathBuf::new(), known: FolderRecord { stages, files }, written: None };
         for (folder, name) in [
             ("", "scene.toml"),
             ("state", "files.json"),

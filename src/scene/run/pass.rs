@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use serde_json::json;
 
 use super::cache::Cache;
-use super::chain::Made;
+use super::chain::FrameHashes;
 use super::done_frames::{DoneFrames, Resumable};
 use super::stage::{FrameFiles, Report, Stage, StepTarget, Stepped, Stepping};
 use crate::context::{Context, PhaseTime};
@@ -17,38 +17,43 @@ use crate::io::files::atomic;
 use crate::io::records::checksummed;
 use crate::io::records::manifest::{Keeps, Manifest};
 
-/// If this many consecutive frames cannot be written, the cause is not a single file name: the disk is full or gone.
-const FAILURES: usize = 3;
-/// Maximum steps that wait for the writer: a step's changes are a few MB.
-const WAITING: usize = 2;
-/// Exact states kept of a stage that cannot resume from its own files and that no other stage reads.
+/// After this many consecutive frames that cannot be written a pass ends: the disk is full or gone.
+const MAX_FAILURES: usize = 3;
+/// Maximum number of steps that wait for the writer, each a few MB.
+const MAX_WAITING: usize = 2;
+/// Number of exact states that are kept, unless a stage requires those of all frames.
 const STATES_KEPT: i32 = 2;
 
 /// Called for each frame whose files are written, with the stage, the frame and its report; from several threads.
-pub type Done<'a> = &'a (dyn Fn(&'static str, i32, &Report) + Sync);
+pub type OnFrameDone<'a> = &'a (dyn Fn(&'static str, i32, &Report) + Sync);
 
 /// Shared by the passes of a run.
 #[derive(Clone, Copy)]
 pub struct Shared<'a> {
-    /// Threads and cancel.
+    /// Its thread pool, cancel and memory limit.
     pub ctx: &'a Context,
     /// The shot's first frame.
     pub first: i32,
     /// Set when a pass has failed: the others stop after their current frame.
     pub stop: &'a AtomicBool,
-    /// Called for each frame.
-    pub done: Done<'a>,
+    /// Called for each frame whose files are written.
+    pub on_done: OnFrameDone<'a>,
 }
 
-/// A stage of any type, with the pass that makes its frames.
+/// A stage whose types of state are erased.
 pub trait AnyStage: Stage {
     /// See [`Stepping::precheck`].
     #[doc(hidden)]
     fn precheck_frames(&self, ctx: &Context, upstream: &[DoneFrames], last: i32) -> Result<()>;
 
-    /// The state from which a frame is reached in the fewest steps.
+    /// The pass to a frame, with the state loaded from which it takes the fewest steps.
     #[doc(hidden)]
-    fn before<'a>(&'a self, ctx: &Context, frame: i32, kept: Resumable<'_>) -> Result<Box<dyn Pass + 'a>>;
+    fn start_pass<'a>(
+        &'a self,
+        ctx: &Context,
+        frame: i32,
+        resumable: Resumable<'_>,
+    ) -> Result<Box<dyn Pass + 'a>>;
 }
 
 impl<S: Stepping> AnyStage for S {
@@ -56,8 +61,13 @@ impl<S: Stepping> AnyStage for S {
         self.precheck(ctx, upstream, last)
     }
 
-    fn before<'a>(&'a self, ctx: &Context, frame: i32, kept: Resumable<'_>) -> Result<Box<dyn Pass + 'a>> {
-        Ok(Box::new(At::before(self, ctx, frame, kept)?))
+    fn start_pass<'a>(
+        &'a self,
+        ctx: &Context,
+        frame: i32,
+        resumable: Resumable<'_>,
+    ) -> Result<Box<dyn Pass + 'a>> {
+        Ok(Box::new(StagePass::before(self, ctx, frame, resumable)?))
     }
 }
 
@@ -68,11 +78,11 @@ pub trait Pass: Send {
     fn make(self: Box<Self>, work: Work<'_>) -> Result<()>;
 }
 
-/// The frames that a pass makes.
+/// The work of a pass: the frames to make.
 pub struct Work<'a> {
     /// Shared with the other passes.
     pub shared: &'a Shared<'a>,
-    /// Gets the records of the frames that were written, even if the pass fails.
+    /// Receives the records of the frames that were written, even if the pass fails.
     pub cache: &'a mut Cache,
     /// The frames of the stages upstream.
     pub upstream: &'a [DoneFrames],
@@ -82,8 +92,8 @@ pub struct Work<'a> {
     pub every_state: bool,
 }
 
-/// A stage's state after a frame.
-struct At<'a, S: Stepping> {
+/// A stage with its state after a frame.
+struct StagePass<'a, S: Stepping> {
     stage: &'a S,
     frame: i32,
     state: S::State,
@@ -97,16 +107,16 @@ enum Job<S: Stepping> {
     Step(Box<Frame<S::Step>>),
 }
 
-/// A step, with the hash of its frame's inputs if its files are wanted.
+/// A step, with the hashes of its frame if the files are wanted.
 struct Frame<T> {
     frame: i32,
-    made: Option<Made>,
+    hashes: Option<FrameHashes>,
     stepped: Stepped<T>,
 }
 
-impl<'a, S: Stepping> At<'a, S> {
-    fn before(stage: &'a S, ctx: &Context, frame: i32, kept: Resumable<'_>) -> Result<Self> {
-        let Resumable { first, own_from, done } = kept;
+impl<'a, S: Stepping> StagePass<'a, S> {
+    fn before(stage: &'a S, ctx: &Context, frame: i32, resumable: Resumable<'_>) -> Result<Self> {
+        let Resumable { first, own_from, done } = resumable;
         if !stage.has_memory() {
             return Ok(Self { stage, frame: frame - 1, state: stage.load(ctx, done, None)? });
         }
@@ -122,31 +132,31 @@ impl<'a, S: Stepping> At<'a, S> {
         Ok(Self { stage, frame: latest.unwrap_or(first - 1), state: stage.load(ctx, done, latest)? })
     }
 
-    /// Steps to every wanted frame; `send` passes the work to the writing thread and returns whether that still listens.
+    /// Steps to every wanted frame; `send` passes a job to the writing thread and returns whether that still receives jobs.
     fn step_all(mut self, work: &mut Work<'_>, send: impl Fn(Job<S>) -> bool) -> Result<()> {
         let Work { shared, upstream, todo, .. } = *work;
         let (stage, ctx, cache) = (self.stage, shared.ctx, &mut *work.cache);
-        let mut follows = false;
+        let mut writer_follows = false;
         for &wanted in todo {
             let is_nearer = || cache.stored.latest_state(self.frame + 1..=wanted - 1).is_some();
             if self.frame < wanted - 1 && (!stage.has_memory() || is_nearer()) {
-                self = Self::before(stage, ctx, wanted, cache.kept(shared.first))?;
-                follows = false;
+                self = Self::before(stage, ctx, wanted, cache.resumable(shared.first))?;
+                writer_follows = false;
             }
             while self.frame < wanted {
                 if shared.stop.load(Ordering::Relaxed) {
                     return Ok(());
                 }
                 let frame = self.frame + 1;
-                if !follows && !send(Job::Start(stage.writer(ctx, &self.state)?)) {
+                if !writer_follows && !send(Job::Start(stage.writer(ctx, &self.state)?)) {
                     return Ok(());
                 }
-                follows = true;
-                let made = if frame == wanted { Some(cache.inputs(stage, frame, upstream)?) } else { None };
-                let made_from = made.as_ref().map(|made| &made.from[..]);
+                writer_follows = true;
+                let hashes = if frame == wanted { Some(cache.hashes(stage, frame, upstream)?) } else { None };
+                let made_from = hashes.as_ref().map(|hashes| &hashes.inputs[..]);
                 let stepped = stage.step(ctx, &mut self.state, &StepTarget { frame, made_from, upstream })?;
                 self.frame = frame;
-                if !send(Job::Step(Box::new(Frame { frame, made, stepped }))) {
+                if !send(Job::Step(Box::new(Frame { frame, hashes, stepped }))) {
                     return Ok(());
                 }
             }
@@ -155,27 +165,27 @@ impl<'a, S: Stepping> At<'a, S> {
     }
 }
 
-impl<S: Stepping> Pass for At<'_, S> {
+impl<S: Stepping> Pass for StagePass<'_, S> {
     fn make(self: Box<Self>, mut work: Work<'_>) -> Result<()> {
         let folder = work.cache.stored.folder().to_path_buf();
         let Work { shared, every_state, .. } = work;
-        let files = Files { stage: self.stage, folder: &folder, first: shared.first, every_state };
-        let (jobs, waiting) = sync_channel(WAITING);
+        let writer = FrameWriter { stage: self.stage, folder: &folder, first: shared.first, every_state };
+        let (jobs, waiting) = sync_channel(MAX_WAITING);
         let (made, finished) = std::thread::scope(|scope| {
-            let writing = scope.spawn(|| files.write_all(waiting, shared.done));
+            let writing = scope.spawn(|| writer.write_all(waiting, shared.on_done));
             let made = self.step_all(&mut work, |job| jobs.send(job).is_ok());
             drop(jobs);
             (made, writing.join())
         });
         let (manifests, written) = finished.unwrap_or_else(|why| resume_unwind(why));
         manifests.into_iter().for_each(|manifest| work.cache.stored.add(manifest));
-        // A writer's error also stopped the steps, and is the one to report.
+        // An error of the writer also ended the steps, and is the one to report.
         written.and(made)
     }
 }
 
-/// The files of a stage's frames.
-struct Files<'a, S> {
+/// Writes the files of a stage's frames.
+struct FrameWriter<'a, S> {
     stage: &'a S,
     folder: &'a Path,
     first: i32,
@@ -183,15 +193,14 @@ struct Files<'a, S> {
     every_state: bool,
 }
 
-impl<S: Stepping> Files<'_, S> {
-    /// Writes until there is no more work or a file cannot be written; if the stage's frames can be written independently, until
-    /// [`FAILURES`] consecutive frames could not. Also returns the records of what was written.
-    fn write_all(&self, waiting: Receiver<Job<S>>, done: Done<'_>) -> (Vec<Manifest>, Result<()>) {
+impl<S: Stepping> FrameWriter<'_, S> {
+    /// Writes until there are no more jobs or a frame cannot be written; if the stage's frames can be written independently, until
+    /// [`MAX_FAILURES`] consecutive frames cannot be written. Also returns the records of the frames that were written.
+    fn write_all(&self, waiting: Receiver<Job<S>>, on_done: OnFrameDone<'_>) -> (Vec<Manifest>, Result<()>) {
         let mut manifests = Vec::new();
         let mut writer = None;
-        // The first error, and the number of consecutive frames that could not be written.
-        let (mut failed, mut on_end): (Option<Error>, usize) = (None, 0);
-        let goes_on = self.stage.writes_frames_independently() && self.stage.needs_every_frame().is_none();
+        let (mut first_error, mut failures_in_a_row): (Option<Error>, usize) = (None, 0);
+        let may_skip = self.stage.writes_frames_independently() && self.stage.needs_every_frame().is_none();
         for job in waiting {
             let frame = match job {
                 Job::Start(start) => {
@@ -204,50 +213,49 @@ impl<S: Stepping> Files<'_, S> {
                 return (manifests, Err(Error::Internal("a step came before its start".into())));
             };
             let number = frame.frame;
-            match self.write(writer, *frame, done) {
+            match self.write(writer, *frame, on_done) {
                 Ok(manifest) => {
                     manifests.extend(manifest);
-                    on_end = 0;
+                    failures_in_a_row = 0;
                 }
-                Err(error @ Error::Io { .. }) if goes_on && on_end + 1 < FAILURES => {
+                Err(error @ Error::Io { .. }) if may_skip && failures_in_a_row + 1 < MAX_FAILURES => {
                     log::warn!("frame {number} is not written: {error}");
-                    failed.get_or_insert(error);
-                    on_end += 1;
+                    first_error.get_or_insert(error);
+                    failures_in_a_row += 1;
                 }
-                Err(error) => return (manifests, Err(failed.unwrap_or(error))),
+                Err(error) => return (manifests, Err(first_error.unwrap_or(error))),
             }
         }
-        (manifests, failed.map_or(Ok(()), Err))
+        (manifests, first_error.map_or(Ok(()), Err))
     }
 
-    /// Writes a frame, or only passes through it.
+    /// Writes a frame, or only updates the writer if its files are not wanted.
     fn write(
         &self,
         writer: &mut S::Writer,
         frame: Frame<S::Step>,
-        done: Done<'_>,
+        on_done: OnFrameDone<'_>,
     ) -> Result<Option<Manifest>> {
-        let Frame { frame, made, stepped: Stepped { step, report } } = frame;
-        let Some(made) = made else {
+        let Frame { frame, hashes, stepped: Stepped { step, report } } = frame;
+        let Some(hashes) = hashes else {
             self.stage.write(writer, step, None)?;
             return Ok(None);
         };
-        let mut files = FrameFiles::new(self.folder, self.stage, frame, &made.from);
+        let mut files = FrameFiles::new(self.folder, self.stage, frame, &hashes.inputs);
         self.stage.write(writer, step, Some(&mut files))?;
-        let (files, state) = files.written();
+        let (files, state) = files.into_written();
         self.write_report(frame, &report)?;
         let keeps = self.stage.keeps(frame);
-        let manifest = Manifest { frame, inputs: made.from, keeps, files, state, next: made.next };
+        let manifest = Manifest { frame, inputs: hashes.inputs, keeps, files, state, next: hashes.next };
         manifest.write(self.folder, self.stage.name())?;
         if keeps == Keeps::State && !self.every_state {
             self.remove_states_before(frame);
         }
-        done(self.stage.name(), frame, &report);
+        on_done(self.stage.name(), frame, &report);
         Ok(Some(manifest))
     }
 
-    /// Removes exact states that are no longer needed to resume, and those that a killed run did not remove. One that cannot be removed
-    /// does no harm.
+    /// Removes exact states that are no longer needed to resume, also those that a killed run left behind; errors are ignored.
     fn remove_states_before(&self, frame: i32) {
         let (stage, extension) = (self.stage.name(), self.stage.state_extension());
         let path = |old: i32| self.folder.join("state").join(format!("{stage}.{old:04}.{extension}"));

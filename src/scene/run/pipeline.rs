@@ -1,4 +1,4 @@
-//! The stages of a scene, and what they have in common.
+//! The stages of a scene, and how they depend on each other.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -15,24 +15,24 @@ use crate::scene::Scene;
 pub struct Pipeline<'a> {
     /// The scene.
     pub scene: &'a Scene,
-    /// Contents of its files when they were read.
+    /// Hashes of its files when they were read.
     pub input_hashes: &'a Arc<InputHashes>,
     /// Its stages.
     pub stages: Vec<Box<dyn AnyStage + 'a>>,
 }
 
 impl Pipeline<'_> {
-    /// The stages, as descriptions.
+    /// The descriptions of the stages.
     pub fn stages(&self) -> impl Iterator<Item = &dyn Stage> {
         self.stages.iter().map(|stage| &**stage as &dyn Stage)
     }
 
-    /// Names of all stages, in their order.
+    /// Names of all stages, upstream stages first.
     pub fn names(&self) -> Vec<&'static str> {
         self.stages().map(|stage| stage.name()).collect()
     }
 
-    /// The stages with these names, by index; all if there are no names.
+    /// Indices of the stages with these names; of all stages if there are no names.
     pub(super) fn chosen(&self, only: &[String]) -> Result<Vec<usize>> {
         if let Some(unknown) = only.iter().find(|name| !self.names().contains(&&name[..])) {
             let names = self.names().join(", ");
@@ -40,26 +40,26 @@ impl Pipeline<'_> {
             return Err(Error::file(&self.scene.path, what));
         }
         let wanted = |name: &str| only.is_empty() || only.iter().any(|known| known == name);
-        Ok((0..self.stages.len()).filter(|position| wanted(self.stages[*position].name())).collect())
+        Ok((0..self.stages.len()).filter(|index| wanted(self.stages[*index].name())).collect())
     }
 
-    /// The stages that depend on these, directly or indirectly, by index.
+    /// Indices of the stages that depend on these, directly or indirectly.
     pub(super) fn downstream(&self, of: &[usize]) -> Vec<usize> {
-        let mut names: Vec<&str> = of.iter().map(|position| self.stages[*position].name()).collect();
+        let mut names: Vec<&str> = of.iter().map(|index| self.stages[*index].name()).collect();
         let mut out = Vec::new();
-        for (position, stage) in self.stages().enumerate() {
+        for (index, stage) in self.stages().enumerate() {
             if stage.upstream().iter().any(|upstream| names.contains(upstream)) {
                 names.push(stage.name());
-                out.push(position);
+                out.push(index);
             }
         }
         out
     }
 
-    /// Refuses frames that the chosen stages read from other stages, if this scene would not make them as they are.
+    /// Fails if the chosen stages read frames of other stages that were made with other settings or inputs than this scene's.
     pub(super) fn refuse_stale(&self, chosen: &[usize], folder: &Path) -> Result<()> {
-        for reader in chosen.iter().map(|position| &self.stages[*position]) {
-            let others = self.stages().enumerate().filter(|(position, _)| !chosen.contains(position));
+        for reader in chosen.iter().map(|index| &self.stages[*index]) {
+            let others = self.stages().enumerate().filter(|(index, _)| !chosen.contains(index));
             for (_, stage) in others.filter(|(_, stage)| reader.upstream().contains(&stage.name())) {
                 let upstream = stage.upstream().iter().map(|name| DoneFrames::read(folder, name));
                 let upstream: Vec<DoneFrames> = upstream.collect::<Result<_>>()?;
@@ -69,7 +69,7 @@ impl Pipeline<'_> {
         Ok(())
     }
 
-    /// Whether the exact states of all frames of a stage are kept: the stage itself, or another one, reads them.
+    /// Whether the exact states of all frames of a stage are kept, because it requires that or another stage reads them.
     pub(super) fn keeps_states_of(&self, of: &dyn Stage) -> bool {
         let reads =
             |stage: &dyn Stage| stage.upstream().contains(&of.name()) && stage.reads_state_of(of.name());

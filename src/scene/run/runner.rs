@@ -6,9 +6,9 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::ScopedJoinHandle;
 
-use super::cache::{Asked, Cache, refuse_asked};
+use super::cache::{Cache, Request, check_request};
 use super::done_frames::DoneFrames;
-use super::own_files::Own;
+use super::own_files::OwnFiles;
 use super::pass::{AnyStage, Pass, Shared, Work};
 use super::pipeline::Pipeline;
 use super::stage::{Report, Stage};
@@ -23,36 +23,36 @@ pub struct Run<'a> {
     pipeline: &'a Pipeline<'a>,
     /// All stages, including those that are not to be made.
     stages: Vec<StageRun<'a>>,
-    own: Own,
-    /// Held until the run ends, whatever ends it.
+    own: OwnFiles,
+    /// Held until the run is dropped.
     _lock: File,
 }
 
 /// A stage in a run.
 struct StageRun<'a> {
     stage: &'a dyn AnyStage,
-    /// Its frames; `None` if it is not to be made.
+    /// Its frames; `None` if it is not to be made in this run.
     cache: Option<Cache>,
     /// Wanted frames that are not done, ascending.
     todo: Vec<i32>,
     /// Number of wanted frames that are done.
-    there: usize,
-    /// The pass, with the state before the first frame of `todo` loaded; none if the upstream stages must run first.
+    existing: usize,
+    /// The pass, with the state loaded from which it starts; `None` if the upstream stages must run first.
     start: Option<Box<dyn Pass + 'a>>,
-    /// Frames removed because upstream stages are made again.
-    forgotten: Vec<Manifest>,
+    /// Frames to remove, because upstream stages are made again.
+    to_remove: Vec<Manifest>,
 }
 
 impl<'a> Run<'a> {
-    /// Opens or creates the folder, finds what is done, loads the states that the first frames start from, and writes the resolved scene
-    /// into the folder. Makes the stages named in `only`, or all.
+    /// Opens or creates the folder, finds the frames that are done, loads the states from which the stages start, and writes the resolved
+    /// scene into the folder. The run makes the stages named in `only`, or all.
     ///
-    /// `from` keeps the frames before it, whatever they were made with, and makes all others of these stages again; those of stages
-    /// downstream of them are removed too.
+    /// `from` keeps the frames before it, whatever settings they were made with. All later frames of these stages are made again, and those
+    /// of stages downstream of them are removed.
     ///
     /// # Errors
     /// A folder that cannot be written, that another run writes into, or whose frames were made with other settings or inputs; a damaged
-    /// record or frame; a gap between frames, if a stage allows none. Nothing is then changed.
+    /// record or frame; a gap between frames, if a stage allows none. No frame is then changed.
     pub fn prepare(
         ctx: &Context,
         pipeline: &'a Pipeline<'a>,
@@ -62,17 +62,17 @@ impl<'a> Run<'a> {
         from: Option<i32>,
     ) -> Result<Self> {
         let chosen = pipeline.chosen(only)?;
-        let asked = Asked { first: pipeline.scene.shot.frames.first, frames, from };
-        // A refused run leaves no folder behind; changes by another run meanwhile are checked again below.
+        let request = Request { first: pipeline.scene.shot.frames.first, frames, from };
+        // Checked before the folder is created, so that a refused run leaves none behind, and again once no other run can write into it.
         let of_run = || chosen.iter().map(|position| &*pipeline.stages[*position] as &dyn Stage);
         for stage in of_run() {
-            refuse_asked(stage, asked, &DoneFrames::read(folder, stage.name())?)?;
+            check_request(stage, request, &DoneFrames::read(folder, stage.name())?)?;
         }
-        Own::read(folder, of_run())?.refuse_foreign(pipeline, frames)?;
+        OwnFiles::read(folder, of_run())?.refuse_foreign(pipeline, frames)?;
         pipeline.refuse_stale(&chosen, folder)?;
         make_folders(of_run(), folder)?;
         let lock = lock(folder)?;
-        let own = Own::read(folder, of_run())?;
+        let own = OwnFiles::read(folder, of_run())?;
         own.remove_unfinished()?;
         own.refuse_foreign(pipeline, frames)?;
         pipeline.refuse_stale(&chosen, folder)?;
@@ -80,8 +80,8 @@ impl<'a> Run<'a> {
         let downstream = if from.is_some() { pipeline.downstream(&chosen) } else { Vec::new() };
         for (position, stage) in pipeline.stages.iter().enumerate() {
             let is_chosen = chosen.contains(&position);
-            let from = asked.from.filter(|_| !is_chosen && downstream.contains(&position));
-            let own_stage = run.open(&**stage, folder, asked, is_chosen, from)?;
+            let remove_from = request.from.filter(|_| !is_chosen && downstream.contains(&position));
+            let own_stage = run.open(&**stage, folder, request, is_chosen, remove_from)?;
             run.stages.push(own_stage);
         }
         run.load(ctx)?;
@@ -95,30 +95,36 @@ impl<'a> Run<'a> {
         &self,
         stage: &'a dyn AnyStage,
         folder: &Path,
-        asked: Asked<'_>,
+        request: Request<'_>,
         is_chosen: bool,
-        forget_from: Option<i32>,
+        remove_from: Option<i32>,
     ) -> Result<StageRun<'a>> {
-        let mut run =
-            StageRun { stage, cache: None, todo: Vec::new(), there: 0, start: None, forgotten: Vec::new() };
+        let mut run = StageRun {
+            stage,
+            cache: None,
+            todo: Vec::new(),
+            existing: 0,
+            start: None,
+            to_remove: Vec::new(),
+        };
         if !is_chosen {
-            if let Some(from) = forget_from {
-                run.forgotten = DoneFrames::read(folder, stage.name())?.leave_out_from(from);
+            if let Some(from) = remove_from {
+                run.to_remove = DoneFrames::read(folder, stage.name())?.leave_out_from(from);
             }
             return Ok(run);
         }
-        let mut cache = Cache::open(stage, self.pipeline.input_hashes, folder, asked)?;
+        let mut cache = Cache::open(stage, self.pipeline.input_hashes, folder, request)?;
         let upstream = self.upstream(stage, folder)?;
-        cache.check_inputs(stage, asked.frames, &upstream)?;
-        let (there, todo): (Vec<i32>, Vec<i32>) =
-            asked.frames.iter().partition(|frame| cache.stored.is_done(*frame));
+        cache.check_inputs(stage, request.frames, &upstream)?;
+        let (existing, todo): (Vec<i32>, Vec<i32>) =
+            request.frames.iter().partition(|frame| cache.stored.is_done(*frame));
         self.refuse_missing(stage, &cache.stored, &todo, &upstream)?;
-        (run.there, run.todo, run.cache) = (there.len(), todo, Some(cache));
+        (run.existing, run.todo, run.cache) = (existing.len(), todo, Some(cache));
         Ok(run)
     }
 
-    /// Making a frame starts from the latest kept state and passes through all frames between. This fails if one of these needs an upstream
-    /// frame that neither exists nor will be made.
+    /// Fails if an upstream frame that a step reads neither exists nor will be made. The steps to a frame start from the latest state that is
+    /// kept, and pass through all frames between.
     fn refuse_missing(
         &self,
         stage: &dyn Stage,
@@ -145,8 +151,8 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// The existing frames of a stage's upstream stages, in the order in which the stage lists them, except frames that this run will make
-    /// again.
+    /// The frames of a stage's upstream stages that are done, in the order of [`Stage::upstream`], except those that this run still has to
+    /// make.
     fn upstream(&self, stage: &dyn Stage, folder: &Path) -> Result<Vec<DoneFrames>> {
         let of = |name: &&str| {
             let mut stored = DoneFrames::read(folder, name)?;
@@ -163,24 +169,25 @@ impl<'a> Run<'a> {
         let first = self.pipeline.scene.shot.frames.first;
         for position in 0..self.stages.len() {
             let run = &self.stages[position];
-            if let ([frame, ..], Some(cache), false) = (&run.todo[..], &run.cache, self.waits(run)) {
+            if let ([frame, ..], Some(cache), false) = (&run.todo[..], &run.cache, self.is_waiting(run)) {
                 let upstream = self.upstream(run.stage, self.own.folder())?;
                 let last = run.todo.last().copied().unwrap_or(*frame);
                 run.stage.precheck_frames(ctx, &upstream, last)?;
-                self.stages[position].start = Some(run.stage.before(ctx, *frame, cache.kept(first))?);
+                self.stages[position].start =
+                    Some(run.stage.start_pass(ctx, *frame, cache.resumable(first))?);
             }
         }
         Ok(())
     }
 
-    /// Removes the frames to be made again, downstream stages first, and writes the settings, the frames that are started and the scene to
-    /// the folder.
+    /// Removes the frames to be made again, downstream stages first, and writes the settings, the range of frames to be written and the scene
+    /// to the folder.
     fn commit(&mut self) -> Result<()> {
         for run in self.stages.iter_mut().rev() {
             let stored = DoneFrames::read(self.own.folder(), run.stage.name())?;
-            run.forgotten.drain(..).try_for_each(|manifest| stored.remove(&manifest))?;
+            run.to_remove.drain(..).try_for_each(|manifest| stored.remove(&manifest))?;
             if let [first, .., last] | [first @ last] = run.todo[..] {
-                self.own.begin(run.stage.name(), first, last)?;
+                self.own.record_started(run.stage.name(), first, last)?;
             }
             if let Some(cache) = &mut run.cache {
                 cache.commit(run.stage)?;
@@ -190,7 +197,7 @@ impl<'a> Run<'a> {
     }
 
     /// Whether a stage upstream of this one still has frames to make.
-    fn waits(&self, run: &StageRun<'_>) -> bool {
+    fn is_waiting(&self, run: &StageRun<'_>) -> bool {
         let mut busy = self.stages.iter().filter(|other| !other.todo.is_empty());
         busy.any(|other| run.stage.upstream().contains(&other.stage.name()))
     }
@@ -201,31 +208,31 @@ impl<'a> Run<'a> {
     }
 
     /// Number of wanted frames that exist, over all stages.
-    pub fn there(&self) -> usize {
-        self.stages.iter().map(|run| run.there).sum()
+    pub fn existing(&self) -> usize {
+        self.stages.iter().map(|run| run.existing).sum()
     }
 
-    /// Makes the frames, and calls `done` with the stage, the frame and its report when a frame's files are written; from several threads
-    /// if stages are independent.
+    /// Makes the frames. Calls `on_done` with the stage, the frame and its report when a frame's files are written, from several threads if
+    /// stages are independent.
     ///
     /// If a stage fails, those that do not depend on it are still made.
     ///
     /// # Errors
     /// The error of the first step or file that fails; complete frames remain, from which another run resumes.
-    pub fn make(mut self, ctx: &Context, done: impl Fn(&'static str, i32, &Report) + Sync) -> Result<()> {
-        let mut failed = None;
+    pub fn make(mut self, ctx: &Context, on_done: impl Fn(&'static str, i32, &Report) + Sync) -> Result<()> {
+        let mut first_error = None;
         while let Some(ready) = self.ready() {
-            let results = self.make_stages(ctx, &ready, &done)?;
+            let results = self.make_stages(ctx, &ready, &on_done)?;
             for (position, result) in ready.into_iter().zip(results) {
                 let Err(error) = result else { continue };
                 if matches!(error, Error::Cancelled) {
                     return Err(error);
                 }
                 self.abandon(position, &error);
-                failed.get_or_insert(error);
+                first_error.get_or_insert(error);
             }
         }
-        if let Some(error) = failed {
+        if let Some(error) = first_error {
             return Err(error);
         }
         if self.pipeline.scene.output.usd {
@@ -240,23 +247,23 @@ impl<'a> Run<'a> {
         self.own.finish()
     }
 
-    /// The stages, by index, that have frames to make and wait for no other; `None` if all is done.
+    /// Indices of the stages that have frames to make and wait for no other; `None` if all is done.
     fn ready(&self) -> Option<Vec<usize>> {
-        let is_ready = |run: &StageRun<'_>| !run.todo.is_empty() && !self.waits(run);
+        let is_ready = |run: &StageRun<'_>| !run.todo.is_empty() && !self.is_waiting(run);
         let ready: Vec<usize> = (0..self.stages.len()).filter(|at| is_ready(&self.stages[*at])).collect();
         (!ready.is_empty()).then_some(ready)
     }
 
     /// Gives up the stages downstream of one that failed.
     fn abandon(&mut self, position: usize, error: &Error) {
-        let gone = self.pipeline.downstream(&[position]);
-        let goes_on =
-            self.stages.iter().enumerate().any(|(n, run)| !gone.contains(&n) && !run.todo.is_empty());
-        if goes_on {
+        let abandoned = self.pipeline.downstream(&[position]);
+        let others_remain =
+            self.stages.iter().enumerate().any(|(n, run)| !abandoned.contains(&n) && !run.todo.is_empty());
+        if others_remain {
             let name = self.stages[position].stage.name();
             log::warn!("stage {name} ends: {error}; stages that need nothing of it go on");
         }
-        gone.into_iter().for_each(|n| self.stages[n].todo.clear());
+        abandoned.into_iter().for_each(|n| self.stages[n].todo.clear());
     }
 
     /// Makes the frames of some stages in parallel; returns the result of each.
@@ -264,10 +271,10 @@ impl<'a> Run<'a> {
         &mut self,
         ctx: &Context,
         ready: &[usize],
-        done: &(dyn Fn(&'static str, i32, &Report) + Sync),
+        on_done: &(dyn Fn(&'static str, i32, &Report) + Sync),
     ) -> Result<Vec<Result<()>>> {
         let stop = AtomicBool::new(false);
-        let shared = Shared { ctx, first: self.pipeline.scene.shot.frames.first, stop: &stop, done };
+        let shared = Shared { ctx, first: self.pipeline.scene.shot.frames.first, stop: &stop, on_done };
         let folder = self.own.folder().to_path_buf();
         let upstream: Vec<Vec<DoneFrames>> = ready
             .iter()
@@ -297,7 +304,7 @@ impl<'a> Run<'a> {
     }
 }
 
-/// If a pass is cancelled or panics, stops the others after their current frame.
+/// Dropped if a pass is cancelled or panics: stops the others after their current frame.
 struct StopOthers<'a>(&'a AtomicBool);
 
 impl Drop for StopOthers<'_> {
@@ -313,10 +320,10 @@ impl StageRun<'_> {
         let start = match self.start.take() {
             Some(start) => start,
             None => {
-                // The upstream frames were made only in this run.
+                // Upstream frames were made only in this run, so that the checks of `load` are still due.
                 cache.check_inputs(self.stage, &FrameChoice::none(), upstream)?;
                 self.stage.precheck_frames(shared.ctx, upstream, todo[todo.len() - 1])?;
-                self.stage.before(shared.ctx, todo[0], cache.kept(shared.first))?
+                self.stage.start_pass(shared.ctx, todo[0], cache.resumable(shared.first))?
             }
         };
         start.make(Work { shared, cache, upstream, todo: &todo, every_state })

@@ -7,12 +7,12 @@ use crate::io::files::sequence::Pattern;
 use crate::io::records::input_hashes::InputHashes;
 use crate::scene::schema::declaration::Key;
 use crate::scene::schema::declaration::Scope::{First, Object};
-use crate::scene::schema::values::path;
+use crate::scene::schema::values::key_path;
 use crate::scene::{Role, Scene};
 
-/// Former values longer than this are not reported.
-const LONG: usize = 80;
-/// Prefix of a hash instead of a file's name: the same content under another name is the same input.
+/// Maximum length of a former value in messages.
+const MAX_LENGTH: usize = 80;
+/// Prefix of a hash that replaces a file's name: the same content under another name is the same input.
 pub const CONTENT: &str = "content ";
 
 /// Settings by key: `snow.noise.size`, `object[1].scale`.
@@ -22,10 +22,10 @@ pub type Settings = BTreeMap<String, String>;
 pub(in crate::scene) fn changed(before: &Settings, after: &Settings) -> Vec<String> {
     let keys: BTreeSet<&String> = before.keys().chain(after.keys()).collect();
     let differs = |key: &&&String| before.get(**key) != after.get(**key);
-    let described = |key: &String| match (before.get(key), named(key)) {
+    let described = |key: &String| match (before.get(key), override_key(key)) {
         (Some(value), key) if value.starts_with(CONTENT) => format!("{key} had another content"),
         (Some(value), key) if key == "shot.frames" => format!("{key} began at {value}"),
-        (Some(value), key) if value.len() > LONG => key,
+        (Some(value), key) if value.len() > MAX_LENGTH => key,
         (Some(value), key) => format!("{key} was {value}"),
         (None, key) => format!("{key} was not there"),
     };
@@ -33,12 +33,12 @@ pub(in crate::scene) fn changed(before: &Settings, after: &Settings) -> Vec<Stri
 }
 
 /// A key as `--set` names it: `object.1.scale`, not `object[1].scale`.
-fn named(key: &str) -> String {
+fn override_key(key: &str) -> String {
     key.replace('[', ".").replace(']', "")
 }
 
 /// The settings that a stage depends on, with the content of the objects' files instead of their names. Only objects with these roles
-/// count, each according to its role. Of the frames only the first counts: a shot may be extended.
+/// count, and of a static object only the keys that matter to it. Of the shot's frames only the first counts: a shot may be extended.
 ///
 /// # Errors
 /// A file that cannot be read.
@@ -60,7 +60,7 @@ pub fn settings_of(
                 Some(_) => true,
             }
         })
-        .map(|(key, object, value)| (path(key, object), value.to_string()))
+        .map(|(key, object, value)| (key_path(key, object), value.to_string()))
         .collect();
     for (index, object) in scene.objects.iter().enumerate().filter(|(_, o)| roles.contains(&o.role)) {
         let content = match (Pattern::parse(&object.file), object.role) {
@@ -81,11 +81,11 @@ pub fn settings_of(
     Ok(settings)
 }
 
-/// Those of a stage's settings that determine its first state.
+/// Those of a stage's settings that determine its first state: keys with the scope [`First`].
 pub fn settings_of_first_state(keys: &[Key], settings: &Settings, stage: &str) -> Settings {
     let is_first = |path: &str| {
         let (table, name) = path.rsplit_once('.').unwrap_or_default();
-        // The index is dropped: `object[1]`.
+        // Without the index of `object[1]`.
         let table = table.split('[').next().unwrap_or(table);
         let declared = keys.iter().find(|key| key.table == table && key.name == name);
         declared.is_some_and(|key| key.scope(stage) == Some(First))

@@ -1,4 +1,4 @@
-//! What a part of a shot must provide so that the frame loop can make it.
+//! The traits of a stage, by which the frame loop makes its frames.
 
 use std::path::{Path, PathBuf};
 
@@ -14,10 +14,10 @@ use crate::io::mesh::Carried;
 use crate::io::records::manifest::{Keeps, Written};
 use crate::io::usd::{self, Clips, Field};
 
-/// A folder of a stage's files: `base/base.0012.vdb`.
+/// A kind of files of a stage, which have a folder of their own: `base/base.0012.vdb`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FileKind {
-    /// Its name, lower-case letters, which is also that of the files in it.
+    /// Name of the folder and of the files in it, lower-case letters.
     pub name: &'static str,
     /// Extensions of the files, lower-case letters.
     pub extensions: &'static [&'static str],
@@ -42,12 +42,12 @@ pub trait Stage: Sync {
         "state"
     }
 
-    /// Why a folder may lack the exact state after a frame, for messages.
+    /// Why a folder may lack the exact state after a frame, for messages: which states are kept.
     fn why_states_are_missing(&self) -> &'static str {
         "state/ keeps those of the last two frames"
     }
 
-    /// Its folders. A frame that [`Keeps::Whole`] or [`Keeps::Changes`] applies to is kept in the folder of the stage's own name.
+    /// Its kinds of files. With [`Keeps::Whole`] or [`Keeps::Changes`], the kind of the stage's own name holds the state.
     fn kinds(&self) -> &'static [FileKind];
 
     /// Whether this scene has files of a kind.
@@ -60,7 +60,7 @@ pub trait Stage: Sync {
         "vdb"
     }
 
-    /// The kind of its .usda files, if this scene has them: they share a manifest, which belongs to no frame.
+    /// The kind of its .usda files, if this scene has them. They share a manifest, which belongs to no single frame.
     fn usd_kind(&self) -> Option<&'static str> {
         None
     }
@@ -71,7 +71,7 @@ pub trait Stage: Sync {
     /// An input that cannot be read.
     fn settings(&self) -> Result<Settings>;
 
-    /// Those of its settings that determine the state before the first frame: a run cannot resume from a state with others.
+    /// Those of its settings that determine the state before the first frame. If one of them changes, no frame can be kept.
     fn first_state_settings(&self, _settings: &Settings) -> Settings {
         Settings::new()
     }
@@ -86,7 +86,7 @@ pub trait Stage: Sync {
         false
     }
 
-    /// Whether it reads the exact states of an upstream stage, not only its files: those of all frames are then kept.
+    /// Whether it reads the exact states of an upstream stage, not only its files: the states of all frames are then kept.
     fn reads_state_of(&self, _upstream: &str) -> bool {
         true
     }
@@ -101,12 +101,12 @@ pub trait Stage: Sync {
         Reads::default()
     }
 
-    /// What another run can resume from after a frame.
+    /// From what a later run can resume after a frame.
     fn keeps(&self, _frame: i32) -> Keeps {
         Keeps::State
     }
 
-    /// The setting that requires every frame to be made, if one does.
+    /// The setting that requires all frames to be made without gaps, if one does.
     fn needs_every_frame(&self) -> Option<&'static str> {
         None
     }
@@ -124,11 +124,11 @@ pub trait Stage: Sync {
 
 /// How a stage goes from frame to frame.
 pub trait Stepping: Stage {
-    /// What it carries from frame to frame.
+    /// The state that it carries from frame to frame.
     type State: Send;
-    /// Passed to the thread that writes the files of a step.
+    /// The result of a step, passed to the thread that writes its files.
     type Step: Send;
-    /// What that thread carries from frame to frame.
+    /// The state that the writing thread carries from frame to frame.
     type Writer: Send;
 
     /// Checks the inputs of all frames up to `last` before the first is made; the frames of the upstream stages exist.
@@ -139,10 +139,10 @@ pub trait Stepping: Stage {
         Ok(())
     }
 
-    /// The state after a frame that `done` keeps, or the state before the first.
+    /// The state after a frame of `done`; with `None`, the state before the first frame.
     ///
     /// # Errors
-    /// Files that are not what was written; anything that the first state cannot be made from.
+    /// Files that differ from what was written; inputs from which the first state cannot be made.
     fn load(&self, ctx: &Context, done: &DoneFrames, after: Option<i32>) -> Result<Self::State>;
 
     /// Advances the state to a frame from the one before it.
@@ -162,12 +162,12 @@ pub trait Stepping: Stage {
     /// Errors of copying the state.
     fn writer(&self, ctx: &Context, state: &Self::State) -> Result<Self::Writer>;
 
-    /// Whether a frame that cannot be written leaves the writer unchanged: later frames are then still written.
+    /// Whether a frame can be written even if the one before could not, because the writer carries nothing that depends on it.
     fn writes_frames_independently(&self) -> bool {
         false
     }
 
-    /// Writes the result of a step; without `files` the frame is only passed through.
+    /// Writes the result of a step; without `files` the frame is not wanted, and only updates the writer.
     ///
     /// # Errors
     /// Errors of the operating system or a library; the frame is then not done.
@@ -184,7 +184,7 @@ pub trait Stepping: Stage {
 pub struct StepTarget<'a> {
     /// The frame.
     pub frame: i32,
-    /// Hash of everything that the frame depends on, if its files are wanted.
+    /// Hash of everything that the frame depends on; `None`: its files are not wanted.
     pub made_from: Option<&'a str>,
     /// The frames of the stages upstream, in the order of [`Stage::upstream`].
     pub upstream: &'a [DoneFrames],
@@ -208,9 +208,9 @@ pub struct Report {
 }
 
 impl Report {
-    /// A report of results, which are an object.
+    /// A report of results, which must be a JSON object.
     pub(in crate::scene) fn new(results: Value, phases: Vec<PhaseTime>) -> Self {
-        let Value::Object(results) = results else { unreachable!("results have names") };
+        let Value::Object(results) = results else { unreachable!("results are a JSON object") };
         Self { results, phases }
     }
 }
@@ -273,8 +273,8 @@ impl<'a> FrameFiles<'a> {
         Ok(())
     }
 
-    /// The files written, and the exact state.
-    pub(super) fn written(self) -> (Vec<Written>, Option<Written>) {
+    /// The files that were written, and the exact state.
+    pub(super) fn into_written(self) -> (Vec<Written>, Option<Written>) {
         (self.files, self.state)
     }
 }
@@ -286,7 +286,7 @@ pub struct Volume {
     pub kind: &'static str,
     /// Name of the prim.
     pub prim: &'static str,
-    /// Its fields, each a grid of the files.
+    /// Its fields, each a grid in every file.
     pub fields: &'static [Field],
     /// Whether it is a guide: to be viewed, not rendered.
     pub is_guide: bool,

@@ -1,20 +1,20 @@
 //! `shot.usda`: the whole shot for programs that read USD.
 
 use super::done_frames::DoneFrames;
-use super::own_files::{Own, SHOT, manifest_of};
+use super::own_files::{OwnFiles, SHOT_USD, usd_manifest};
 use super::pipeline::Pipeline;
 use super::stage::{Stage, Volume};
 use crate::error::Result;
 use crate::io::usd::{self, Clips, VolumeFiles};
 
-/// Writes the description of the existing frames, by relative paths.
+/// Writes the description of the existing frames, with relative paths.
 ///
 /// # Errors
 /// What the operating system reports.
 pub(super) fn write<'s>(
     pipeline: &Pipeline,
     stages: impl Iterator<Item = (&'s dyn Stage, &'s DoneFrames)>,
-    files: &mut Own,
+    files: &mut OwnFiles,
 ) -> Result<()> {
     let (frames, fps) = (pipeline.scene.shot.frames, pipeline.scene.shot.fps);
     let relative = |stored: &DoneFrames, kind: &str| -> Vec<(i32, String)> {
@@ -33,10 +33,10 @@ pub(super) fn write<'s>(
     }
     for Clips { kind, prims, .. } in &clips {
         let manifest = usd::clip_manifest(kind, prims);
-        files.write(&manifest_of(kind), manifest.as_bytes())?;
+        files.write(&usd_manifest(kind), manifest.as_bytes())?;
     }
     let time = usd::StageTime { first: frames.first, last: frames.last, fps };
     let comment = format!("made by frazil {}", env!("CARGO_PKG_VERSION"));
     let text = usd::stage(&comment, time, &volumes, &clips);
-    files.write(SHOT, text.as_bytes())
+    files.write(SHOT_USD, text.as_bytes())
 }

@@ -1,4 +1,4 @@
-//! Reads all files in an output folder and compares them with what was written.
+//! Compares all files in an output folder with what runs wrote.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -6,33 +6,33 @@ use std::path::Path;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::done_frames::record_of;
+use super::done_frames::parse_record_name;
 use super::own_files;
-use super::own_files::Own;
+use super::own_files::OwnFiles;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::records::checksummed;
 use crate::io::records::manifest::{Manifest, Written};
 
-/// What runs wrote into a folder besides the records of frames.
+/// The record of the files that runs wrote into a folder.
 const FILES: &str = "state/files.json";
 
 /// Contents of a folder.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Verified {
-    /// Frames of which at least one stage is done.
+    /// Number of frames of which at least one stage is done.
     pub frames: usize,
-    /// Files that were compared, including records.
+    /// Number of files that were compared, including records.
     pub files: usize,
     /// Bytes of the frames' files.
     pub bytes: u64,
-    /// Files that are not what was written, ordered by name.
+    /// Files that differ from what was written, ordered by name.
     pub damaged: Vec<Damage>,
-    /// Files named like those of runs that no record knows: unfinished, or not written by a run.
+    /// Files that are named like those of runs but are in no record: unfinished, or not written by a run.
     pub unknown: Vec<String>,
 }
 
-/// A file that is not what was written.
+/// A file that differs from what was written.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct Damage {
     /// Its path relative to the folder.
@@ -48,12 +48,12 @@ pub struct Damage {
 pub fn verify(ctx: &Context, folder: &Path) -> Result<Verified> {
     std::fs::read_dir(folder).map_err(|error| Error::io(folder, "read", error))?;
     let (mut damaged, mut known) = (Vec::new(), BTreeSet::new());
-    let (own, faults) = match Own::read(folder, std::iter::empty()) {
+    let (own, faults) = match OwnFiles::read(folder, std::iter::empty()) {
         Ok(own) => (own, Vec::new()),
-        Err(error) => (Own::unknown(folder), vec![damage_of(FILES, error)]),
+        Err(error) => (OwnFiles::unknown(folder), vec![damage_of(FILES, error)]),
     };
     damaged.extend(faults);
-    let stages = own.stages_there()?;
+    let stages = own.recorded_stages()?;
     if stages.is_empty() && damaged.is_empty() {
         return Err(Error::file(folder, "holds no frames: no run wrote into it"));
     }
@@ -71,8 +71,8 @@ pub fn verify(ctx: &Context, folder: &Path) -> Result<Verified> {
     }
     let (own_files, faults) = own.faults();
     damaged.extend(faults.into_iter().map(|(file, what)| Damage { file, what }));
-    known.extend([own_files::SCENE, own_files::SHOT, FILES].map(String::from));
-    known.extend(own.loose().map(String::from));
+    known.extend([own_files::SCENE, own_files::SHOT_USD, FILES].map(String::from));
+    known.extend(own.shot_files().map(String::from));
     let files: Vec<&Written> = manifests
         .iter()
         .flat_map(|(_, manifest)| manifest.files.iter().chain(state_of(folder, manifest)))
@@ -113,7 +113,7 @@ fn damage_of(file: &str, error: Error) -> Damage {
 
 /// The record of a frame, if a file has the name of one.
 fn manifest(folder: &Path, name: &str, damaged: &mut Vec<Damage>) -> Option<(String, Manifest)> {
-    let (stage, frame) = record_of(name.strip_prefix("state/")?)?;
+    let (stage, frame) = parse_record_name(name.strip_prefix("state/")?)?;
     match Manifest::read(folder, stage, frame) {
         Ok(manifest) => manifest.map(|manifest| (name.to_string(), manifest)),
         Err(error) => {

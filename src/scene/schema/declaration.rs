@@ -26,11 +26,11 @@ pub enum Kind {
     Choice(&'static [&'static str]),
     /// A list of these texts, each once.
     Choices(&'static [&'static str]),
-    /// A number from the first to the second, in a unit that may be empty.
+    /// A number between these two, in a unit that may be empty.
     Number(f64, f64, &'static str),
-    /// A length (m) from the first to the second number of cells.
+    /// A length (m) between these numbers of cells.
     Cells(f64, f64),
-    /// A whole number from the first to the second.
+    /// A whole number between these two.
     Whole(i64, i64),
     /// A fixed count of numbers, each at most this far from 0, in a unit.
     Numbers(usize, f64, &'static str),
@@ -53,7 +53,7 @@ pub enum Fallback {
     Required,
     /// No value.
     Nothing,
-    /// A value, as a scene writes it.
+    /// A value, in TOML.
     Is(&'static str),
     /// A number of cells (m).
     Cells(f64),
@@ -62,20 +62,20 @@ pub enum Fallback {
 /// The key's line in the scene that `frazil new` prints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Example {
-    /// Its value, if it is not the default.
+    /// Its value in TOML; `None`: the default.
     pub value: Option<&'static str>,
-    /// Whether the scene to begin with has it; else it is commented out.
+    /// Whether the line is active; else it is commented out.
     pub is_shown: bool,
 }
 
-/// What holds in a scene that leaves a key out, and the example of a starter scene.
+/// The default of a key, and its line in a starter scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unset {
     fallback: Fallback,
     example: Example,
 }
 
-/// A default, as a scene writes it.
+/// A default, in TOML.
 pub const fn or(value: &'static str) -> Unset {
     Unset { fallback: Fallback::Is(value), example: Example { value: None, is_shown: false } }
 }
@@ -85,23 +85,23 @@ pub const fn or_cells(cells: f64) -> Unset {
     Unset { fallback: Fallback::Cells(cells), ..or("") }
 }
 
-/// No value by default; with an example.
+/// No default; with an example value.
 pub const fn optional(example: &'static str) -> Unset {
     Unset { fallback: Fallback::Nothing, ..or("") }.such_as(example)
 }
 
-/// Leaving the key out is an error; with an example.
+/// Leaving the key out is an error; with an example value.
 pub const fn required(example: &'static str) -> Unset {
     Unset { fallback: Fallback::Required, ..or("") }.such_as(example)
 }
 
 impl Unset {
-    /// The value of the example.
+    /// With this value in the example.
     pub const fn such_as(self, value: &'static str) -> Self {
         Self { example: Example { value: Some(value), is_shown: false }, ..self }
     }
 
-    /// The example is not commented out.
+    /// With an example that is not commented out.
     pub const fn shown(self) -> Self {
         Self { example: Example { is_shown: true, ..self.example }, ..self }
     }
@@ -114,7 +114,7 @@ pub type Scopes = &'static [(&'static str, Scope)];
 /// value from [`super::Values`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Key {
-    /// Its table, such as `snow.noise`; `object` for all objects.
+    /// Its table, such as `snow.noise`; `object` for every `[[object]]`.
     pub table: &'static str,
     /// Its name in the table.
     pub name: &'static str,
@@ -122,12 +122,11 @@ pub struct Key {
     pub kind: Kind,
     /// Its default.
     pub fallback: Fallback,
-    /// Pairs of a name and a default: the default that replaces `fallback` if the table's `preset`, or `liquid`, has that name, as a scene
-    /// writes it.
+    /// Presets with their defaults, in TOML: one replaces `fallback` if the table's `preset`, or `liquid`, names it.
     pub presets: &'static [(&'static str, &'static str)],
     /// Its line in a starter scene.
     pub example: Example,
-    /// Whether it applies to characters only.
+    /// Whether it applies to characters (glTF) only.
     pub of_characters: bool,
     /// Its meaning, for the resolved scene, the starter scene and the reference.
     pub meaning: &'static str,
@@ -142,17 +141,17 @@ pub const fn key(scopes: Scopes, table: &'static str, name: &'static str, kind: 
 }
 
 impl Key {
-    /// Its meaning.
+    /// With this meaning.
     pub const fn means(self, meaning: &'static str) -> Self {
         Self { meaning, ..self }
     }
 
-    /// Pairs of a name and a default: the default that replaces `fallback` if the table's `preset`, or `liquid`, has that name.
+    /// With these [`Key::presets`].
     pub const fn with_presets(self, presets: &'static [(&'static str, &'static str)]) -> Self {
         Self { presets, ..self }
     }
 
-    /// It applies to characters only.
+    /// For characters (glTF) only.
     pub const fn of_characters(self) -> Self {
         Self { of_characters: true, ..self }
     }
@@ -163,12 +162,12 @@ impl Key {
     }
 }
 
-/// The table of objects; a scene may have many.
+/// The table of objects.
 pub const OBJECT: &str = "object";
-/// All tables that a scene may have many of.
+/// The arrays of tables (`[[object]]`).
 pub const TABLE_ARRAYS: [&str; 6] = [OBJECT, "scalar", "pour", "source", "drain", "absorber"];
 
-/// Whether a scene may have many of a table.
+/// Whether a table is an element of an array of tables.
 pub fn is_table_array(table: &str) -> bool {
     TABLE_ARRAYS.contains(&table)
 }

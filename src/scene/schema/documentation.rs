@@ -1,12 +1,12 @@
-//! Documentation of all keys: a starter scene, and a table.
+//! Documentation of keys: a starter scene, and a table in Markdown.
 
 use super::declaration::{Fallback, Key, Kind, heading, is_table_array};
 use super::shared_keys::{self, tables};
-
 use super::toml_table::with_value;
 use super::values::any_of;
 use std::fmt::Write;
 
+/// A commented starter scene, for a system with this title and name.
 pub fn template_of([title, name]: [&str; 2], keys: &[Key]) -> String {
     let mut out = format!(
         "# {}: `frazil check shot.toml`, then `frazil {} shot.toml -o cache/`.\n\
@@ -16,13 +16,13 @@ pub fn template_of([title, name]: [&str; 2], keys: &[Key]) -> String {
     );
     for table in tables(keys) {
         let keys_of = || keys.iter().filter(|key| key.table == table);
-        let is_needed = keys_of().any(|key| key.example.is_shown);
-        let many = match table {
+        let is_shown = keys_of().any(|key| key.example.is_shown);
+        let note = match table {
             _ if is_table_array(table) => "  # as many as there are",
             _ if shared_keys::OPTIONAL_TABLES.contains(&table) => "  # only with this line are there any",
             _ => "",
         };
-        let _ = writeln!(out, "\n{}{}{many}", if is_needed { "" } else { "# " }, heading(table));
+        let _ = writeln!(out, "\n{}{}{note}", if is_shown { "" } else { "# " }, heading(table));
         keys_of().for_each(|key| out.push_str(&example(key, keys)));
     }
     out
@@ -35,7 +35,7 @@ fn example(key: &Key, keys: &[Key]) -> String {
     let characters = if key.of_characters { "of a .glb: " } else { "" };
     let (first, rest) =
         value.split_once('\n').map_or((&value[..], None), |(first, rest)| (first, Some(rest)));
-    let meaning = format!("{characters}{}{}", key.meaning, cells(key));
+    let meaning = format!("{characters}{}{}", key.meaning, default_in_cells(key));
     let rest = rest.map_or(String::new(), |rest| format!("{rest}\n"));
     line(&format!("{mark}{} = {first}", key.name), &meaning) + &rest
 }
@@ -53,13 +53,14 @@ fn default_value(key: &Key, keys: &[Key]) -> String {
     }
 }
 
-fn cells(key: &Key) -> String {
+fn default_in_cells(key: &Key) -> String {
     match key.fallback {
         Fallback::Cells(cells) => format!("; default {} cells", rounded(cells)),
         _ => String::new(),
     }
 }
 
+/// A table of keys in Markdown.
 pub fn reference_of(keys: &[Key]) -> String {
     let mut out = String::new();
     for table in tables(keys) {
@@ -75,19 +76,19 @@ pub fn reference_of(keys: &[Key]) -> String {
             };
             let presets = key.presets.iter().map(|(name, value)| format!("; {name} `{value}`"));
             let default = default + &presets.collect::<String>();
-            let _ = writeln!(out, "| `{}` | {} | {default} | {} |", key.name, holds(key), key.meaning);
+            let _ = writeln!(out, "| `{}` | {} | {default} | {} |", key.name, allowed(key), key.meaning);
         }
     }
     out.trim_start().to_string()
 }
 
-/// The values of a key, with range and unit.
-fn holds(key: &Key) -> String {
+/// The values that a key may have, with range and unit.
+fn allowed(key: &Key) -> String {
     let texts = |texts: &[&str], or: &str| {
         texts.iter().map(|text| format!("`\"{text}\"`")).collect::<Vec<_>>().join(or)
     };
     let of_unit = |unit: &str| if unit.is_empty() { String::new() } else { format!(" {unit}") };
-    let held = match key.kind {
+    let values = match key.kind {
         Kind::Frames => "`\"A-B\"`".to_string(),
         Kind::Flag => "`true` or `false`".to_string(),
         Kind::Text => "a text".to_string(),
@@ -96,21 +97,21 @@ fn holds(key: &Key) -> String {
         Kind::Number(low, high, unit) => format!("{} to {}{}", short(low), short(high), of_unit(unit)),
         Kind::Cells(low, high) => format!("m, {low} to {high} cells"),
         Kind::Whole(low, high) => format!("whole, {low} to {high}"),
-        Kind::Numbers(count, far, unit) => {
-            format!("{count} numbers, each -{0} to {0}{1}", short(far), of_unit(unit))
+        Kind::Numbers(count, limit, unit) => {
+            format!("{count} numbers, each -{0} to {0}{1}", short(limit), of_unit(unit))
         }
         Kind::File(extensions) => any_of(extensions),
-        Kind::HeightOrFile(far, extensions) => {
-            format!("-{0} to {0} m, or {1}", short(far), any_of(extensions))
+        Kind::HeightOrFile(limit, extensions) => {
+            format!("-{0} to {0} m, or {1}", short(limit), any_of(extensions))
         }
-        Kind::NumbersOrFile(count, far, unit, extensions) => {
-            let numbers = format!("{count} numbers, each -{0} to {0}{1}", short(far), of_unit(unit));
+        Kind::NumbersOrFile(count, limit, unit, extensions) => {
+            let numbers = format!("{count} numbers, each -{0} to {0}{1}", short(limit), of_unit(unit));
             format!("{numbers}, or {}", any_of(extensions))
         }
-        Kind::Named(far) => format!("table of numbers by names, each -{0} to {0}", short(far)),
+        Kind::Named(limit) => format!("table of numbers by names, each -{0} to {0}", short(limit)),
         Kind::Poses(_) => "list of `{ frame, at, turn_deg }`".to_string(),
     };
-    if key.of_characters { format!("{held}; .glb and .gltf") } else { held }
+    if key.of_characters { format!("{values}; .glb and .gltf") } else { values }
 }
 
 /// A bound of a range, without long rows of zeros.
@@ -119,7 +120,7 @@ fn short(bound: f64) -> String {
     if size != 0.0 && !(1e-3..1e5).contains(&size) { format!("{bound:e}") } else { bound.to_string() }
 }
 
-/// A number with five digits, for people to read.
+/// A number rounded to five digits.
 pub(in crate::scene) fn rounded(number: f64) -> f64 {
     format!("{number:.4e}").parse().unwrap_or(number)
 }

@@ -3,11 +3,11 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Maximum frames of a shot.
-const MOST: i64 = 10_000_000;
+/// Maximum number of frames of a shot.
+const MAX_FRAMES: i64 = 10_000_000;
 
-/// Maximum frame number, positive or negative.
-const FARTHEST: i32 = 1_000_000_000;
+/// Maximum absolute frame number.
+const MAX_FRAME_NUMBER: i32 = 1_000_000_000;
 
 /// First and last frame of a shot, both included.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,9 +40,9 @@ impl FromStr for Frames {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let refused = || format!("\"{text}\" is not a range of frames such as \"1001-1120\"");
-        let within = |frame: &i32| (-FARTHEST..=FARTHEST).contains(frame);
+        let within = |frame: &i32| (-MAX_FRAME_NUMBER..=MAX_FRAME_NUMBER).contains(frame);
         let number = |text: &str| text.trim().parse::<i32>().ok().filter(within).ok_or_else(refused);
-        // A minus at the start is a sign.
+        // A leading minus is a sign.
         let (first, last) = match text.char_indices().skip(1).find(|(_, letter)| *letter == '-') {
             None => (number(text)?, number(text)?),
             Some((at, _)) => (number(&text[..at])?, number(&text[at + 1..])?),
@@ -50,8 +50,8 @@ impl FromStr for Frames {
         if last < first {
             return Err(format!("the range of frames \"{text}\" ends before it starts"));
         }
-        if i64::from(last) - i64::from(first) >= MOST {
-            return Err(format!("the range of frames \"{text}\" has more than {MOST} frames"));
+        if i64::from(last) - i64::from(first) >= MAX_FRAMES {
+            return Err(format!("the range of frames \"{text}\" has more than {MAX_FRAMES} frames"));
         }
         Ok(Self { first, last })
     }
@@ -66,7 +66,7 @@ impl fmt::Display for Frames {
 /// A choice of a shot's frames: ranges, each with a step, joined by commas.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FrameChoice {
-    /// Ascending, each once; at least one.
+    /// Ascending, each once; empty only in [`FrameChoice::none`].
     frames: Vec<i32>,
 }
 
@@ -86,7 +86,7 @@ impl FrameChoice {
         self.frames.iter().copied()
     }
 
-    /// Number of frames, at least 1.
+    /// Number of frames.
     pub fn count(&self) -> usize {
         self.frames.len()
     }
@@ -96,7 +96,7 @@ impl FrameChoice {
         self.frames.binary_search(&frame).is_ok()
     }
 
-    /// No frames.
+    /// No frames: without a first and a last one.
     pub(in crate::scene) fn none() -> Self {
         Self { frames: Vec::new() }
     }
@@ -125,8 +125,8 @@ impl FromStr for FrameChoice {
                 return Err(refused());
             }
             frames.extend(range.iter().step_by(step));
-            if frames.len() as i64 > 2 * MOST {
-                return Err(format!("\"{text}\" asks for more than {MOST} frames"));
+            if frames.len() as i64 > 2 * MAX_FRAMES {
+                return Err(format!("\"{text}\" asks for more than {MAX_FRAMES} frames"));
             }
         }
         frames.sort_unstable();

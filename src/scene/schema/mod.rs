@@ -1,6 +1,8 @@
-//! The text of scene files, of any keys: no system is known here (`systems/` knows all). A key is declared once (`key.rs`: how; `keys.rs`:
-//! shared keys; each system's `keys.rs`: its own); reading, defaults, ranges, the resolved scene, the starter scene, the reference and the
-//! settings of the stages follow from that.
+//! Scene files as text, for any list of keys: no system is known here (`systems/` knows all).
+//!
+//! A key is declared once, as a [`declaration::Key`]: those that systems share in `shared_keys.rs`, all others in the keys of their
+//! system. Reading and checking (`toml_table.rs`, `values.rs`), settings of the command line (`overrides.rs`), the starter scene and the
+//! table of keys (`documentation.rs`) follow from the declarations.
 
 pub(super) mod declaration;
 pub(super) mod documentation;
@@ -14,7 +16,7 @@ pub use frames::{FrameChoice, Frames};
 pub use overrides::Override;
 pub use values::{Value, Values};
 
-pub(super) use crate::scene::schema::values::name;
+pub(super) use crate::scene::schema::values::file_name;
 pub(super) use documentation::{reference_of, rounded, template_of};
 pub(super) use shared_keys::{FAR, NO_ORIGIN, ORIGIN, ORIGIN_MEANS};
 pub(super) use toml_table::Table;

@@ -35,17 +35,17 @@ impl Override {
         &self.text
     }
 
-    /// Puts the value into a document; `position` is its position for messages.
+    /// Puts the value into a document, at the offset that errors refer to.
     pub(in crate::scene) fn apply<'i>(
         &'i self,
         root: &mut DeTable<'i>,
-        position: usize,
+        offset: usize,
         path: &Path,
     ) -> Result<()> {
-        // What is not TOML is taken as text: names of files and choices need no quotes.
+        // A value that is not TOML is a text: names of files and choices need no quotes.
         let value = match DeValue::parse(&self.value) {
-            Ok(value) => moved(value.into_inner(), position),
-            Err(_) => Spanned::new(position..position, DeValue::String(self.value.as_str().into())),
+            Ok(value) => with_offset(value.into_inner(), offset),
+            Err(_) => Spanned::new(offset..offset, DeValue::String(self.value.as_str().into())),
         };
         let refused =
             |what: String| Error::argument(format!("{}: --set {}: {what}", path.display(), self.text));
@@ -54,8 +54,8 @@ impl Override {
         let mut parts = parents.iter();
         while let Some(part) = parts.next() {
             let name: std::borrow::Cow<'i, str> = part.as_str().into();
-            let empty = || Spanned::new(position..position, DeValue::Table(DeTable::new()));
-            let entry = table.entry(Spanned::new(position..position, name)).or_insert_with(empty);
+            let empty = || Spanned::new(offset..offset, DeValue::Table(DeTable::new()));
+            let entry = table.entry(Spanned::new(offset..offset, name)).or_insert_with(empty);
             table = match entry.get_mut() {
                 DeValue::Table(inner) => inner,
                 DeValue::Array(items) => {
@@ -70,30 +70,30 @@ impl Override {
                 _ => return Err(refused(format!("`{part}` is not a table"))),
             };
         }
-        table.insert(Spanned::new(position..position, last.as_str().into()), value);
+        table.insert(Spanned::new(offset..offset, last.as_str().into()), value);
         Ok(())
     }
 }
 
-/// A value with all its parts at one position.
-fn moved(value: DeValue<'_>, position: usize) -> Spanned<DeValue<'_>> {
+/// A value, with this offset for all of its parts.
+fn with_offset(value: DeValue<'_>, offset: usize) -> Spanned<DeValue<'_>> {
     let value = match value {
         DeValue::Table(table) => {
             let mut out = DeTable::new();
             for (key, value) in table {
                 out.insert(
-                    Spanned::new(position..position, key.into_inner()),
-                    moved(value.into_inner(), position),
+                    Spanned::new(offset..offset, key.into_inner()),
+                    with_offset(value.into_inner(), offset),
                 );
             }
             DeValue::Table(out)
         }
         DeValue::Array(items) => {
             let mut out = DeArray::new();
-            items.into_iter().for_each(|item| out.push(moved(item.into_inner(), position)));
+            items.into_iter().for_each(|item| out.push(with_offset(item.into_inner(), offset)));
             DeValue::Array(out)
         }
         other => other,
     };
-    Spanned::new(position..position, value)
+    Spanned::new(offset..offset, value)
 }

@@ -1,7 +1,6 @@
-//! Tables of a TOML file read key by key, so that every refusal names the file, the line and the key.
+//! Tables of a TOML file, read key by key, so that every error names the file, the line and the key.
 //!
-//! serde's own errors know neither the table nor the nearest key, and are of no use for a key that may be a number or a text; this reader
-//! walks the parsed document instead.
+//! serde's own errors name neither the table nor the nearest key, and are of no use for a key that may be a number or a text.
 
 use super::overrides::Override;
 use crate::error::{Error, Result};
@@ -17,22 +16,22 @@ pub struct Document<'a> {
     pub text: &'a str,
     /// The absolute folder that relative paths start from.
     pub folder: PathBuf,
-    /// Settings of the command line; setting i has a position after the end of the text: [`Document::position_of`].
+    /// Settings of the command line; each has an offset beyond the end of the text: [`Document::offset_of_override`].
     pub overrides: &'a [Override],
 }
 
 impl Document<'_> {
     /// An error at a byte offset of the text: `shot.toml:12: ...`.
     pub fn error(&self, offset: usize, what: impl std::fmt::Display) -> Error {
-        if let Some(typed) = self.override_at(offset) {
-            return Error::argument(format!("{}: --set {}: {what}", self.path.display(), typed.text()));
+        if let Some(setting) = self.override_at(offset) {
+            return Error::argument(format!("{}: --set {}: {what}", self.path.display(), setting.text()));
         }
         let line = 1 + self.text.bytes().take(offset).filter(|&byte| byte == b'\n').count();
         Error::argument(format!("{}:{line}: {what}", self.path.display()))
     }
 
-    /// Position of the values of a command-line setting.
-    pub fn position_of(&self, index: usize) -> usize {
+    /// The offset that stands for a setting of the command line.
+    pub fn offset_of_override(&self, index: usize) -> usize {
         self.text.len() + 1 + index
     }
 
@@ -40,7 +39,7 @@ impl Document<'_> {
         self.overrides.get(offset.checked_sub(self.text.len() + 1)?)
     }
 
-    /// The absolute path of a file named at an offset: from the scene's folder, or the current one for the command line.
+    /// The absolute path of a file named at an offset: relative to the scene's folder, or for the command line to the current one.
     fn path_at(&self, offset: usize, name: &str) -> PathBuf {
         match self.override_at(offset) {
             Some(_) => std::path::absolute(name).unwrap_or_else(|_| name.into()),
@@ -54,7 +53,7 @@ pub struct Table<'a, 'i> {
     document: &'a Document<'a>,
     /// As written in the file: `[shot]`; empty for the file itself.
     name: String,
-    /// `None` if the table is missing: it has no keys then.
+    /// `None` if the table is missing.
     entries: Option<&'a DeTable<'i>>,
     offset: usize,
 }
@@ -71,12 +70,12 @@ impl<'a, 'i> Table<'a, 'i> {
         let table = Self { document, name: name.to_string(), entries: Some(entries), offset };
         let unknown = entries.keys().filter(|key| !known.contains(&&**key.get_ref()));
         let Some(key) = unknown.min_by_key(|key| key.span().start) else { return Ok(table) };
-        let position = if name.is_empty() { String::new() } else { format!(" in {name}") };
         let hint = match nearest(key.get_ref(), known) {
             Some(near) => format!("did you mean `{near}`?"),
             None => format!("the keys are {}", listed(known)),
         };
-        Err(document.error(key.span().start, format!("unknown key `{}`{position}; {hint}", key.get_ref())))
+        Err(document
+            .error(key.span().start, format!("unknown key `{}`{}; {hint}", key.get_ref(), table.in_name())))
     }
 
     /// A missing table: it has no keys.
@@ -93,13 +92,17 @@ impl<'a, 'i> Table<'a, 'i> {
         self.entry(key).is_some()
     }
 
-    /// An error about a key's value, at its line; at the table's own line if the key is missing.
-    pub fn error(&self, key: &str, what: impl std::fmt::Display) -> Error {
-        let position = if self.name.is_empty() { String::new() } else { format!(" in {}", self.name) };
-        self.document.error(self.offset_of(key), format!("`{key}`{position} {what}"))
+    /// " in [shot]"; empty for the file itself.
+    fn in_name(&self) -> String {
+        if self.name.is_empty() { String::new() } else { format!(" in {}", self.name) }
     }
 
-    /// The position of a key's value; the table's own if the key is missing.
+    /// An error about a key's value, at its line; at the table's own line if the key is missing.
+    pub fn error(&self, key: &str, what: impl std::fmt::Display) -> Error {
+        self.document.error(self.offset_of(key), format!("`{key}`{} {what}", self.in_name()))
+    }
+
+    /// The offset of a key's value; the table's own if the key is missing.
     fn offset_of(&self, key: &str) -> usize {
         self.entry(key).map_or(self.offset, |value| value.span().start)
     }
@@ -108,7 +111,7 @@ impl<'a, 'i> Table<'a, 'i> {
         self.error(key, format!("must be {wanted}, not {}", kind_of(found)))
     }
 
-    /// A value, read by a function that returns `None` for one of another type.
+    /// A value, read by a function that returns `None` for other types.
     fn typed<T>(
         &self,
         key: &str,
@@ -240,7 +243,7 @@ impl<'a, 'i> Table<'a, 'i> {
     }
 }
 
-/// Reads a value that is not in a file, such as a default, from a table with only its key.
+/// Reads a value that is not in a file, such as a default; `read` gets a table with only this key.
 pub fn with_value<T>(key: &str, value: &str, read: impl FnOnce(&Table) -> Result<T>) -> Result<T> {
     let text = format!("{key} = {value}");
     let document = Document { path: Path::new(key), text: &text, folder: PathBuf::new(), overrides: &[] };

@@ -31,7 +31,7 @@ pub enum Value {
     Number(f64),
     /// A whole number.
     Whole(i64),
-    /// As many numbers as the key has.
+    /// As many numbers as the key declares.
     Numbers(Vec<f64>),
     /// Numbers by names.
     Named(BTreeMap<String, f64>),
@@ -41,22 +41,21 @@ pub enum Value {
     Poses(Vec<KeyPose>),
 }
 
-/// The values of a scene's keys: of its tables, its objects and all other tables that it may have many of. A key without a value is not in
-/// it.
+/// The values of a scene's keys. A key without a value has no entry.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Values {
     keys: &'static [Key],
-    /// By the index of the table, if there may be many, and the key's index in `keys`.
+    /// By the table's index, if it is an element of an array, and the key's index in `keys`.
     values: BTreeMap<(Option<usize>, usize), Value>,
 }
 
-/// A type that a key's value converts to.
+/// A type that a key's value can be read as.
 pub trait FromValue: Sized {
     /// `None` for a value of another type.
     fn of(value: &Value) -> Option<Self>;
 }
 
-/// Declares the types that values convert to: from which kind of value, and how.
+/// Implements [`FromValue`]: for each type the variant of [`Value`], and the conversion.
 macro_rules! from_value {
     ($($type:ty: $value:pat => $read:expr;)*) => {
         $(impl FromValue for $type {
@@ -90,7 +89,7 @@ impl<const N: usize> FromValue for [f64; N] {
     }
 }
 
-/// The values of a table: the only one of its name, or one of many.
+/// The values of a table, or of an element of an array of tables.
 #[derive(Debug, Clone, Copy)]
 pub struct TableValues<'v> {
     values: &'v Values,
@@ -101,20 +100,20 @@ pub struct TableValues<'v> {
 impl<'v> TableValues<'v> {
     /// A value.
     pub fn value(&self, name: &str) -> Option<&'v Value> {
-        self.values.of(self.index, self.table, name)
+        self.values.find(self.index, self.table, name)
     }
 
-    /// The value of a key that has a default or is required. The default comes only from the key's declaration.
+    /// The value of a key that is required or has a default, which its declaration provides for a table that the scene leaves out.
     ///
     /// # Panics
-    /// A key that is not declared, has no default, or holds something else: a programming error, whatever the scene.
+    /// A key that is not declared, has no default or has another type: a programming error, whatever the scene.
     pub fn get<T: FromValue>(&self, name: &str) -> T {
-        let value = self.value(name).cloned().or_else(|| self.values.declared(self.table, name));
+        let value = self.value(name).cloned().or_else(|| self.values.declared_default(self.table, name));
         let value = value.as_ref().and_then(T::of);
         value.unwrap_or_else(|| panic!("{}.{name} has no default of this type", self.table))
     }
 
-    /// The value of an optional key, if it has this type.
+    /// The value of an optional key; `None` also if it has another type.
     pub fn find<T: FromValue>(&self, name: &str) -> Option<T> {
         T::of(self.value(name)?)
     }
@@ -135,9 +134,9 @@ impl<'v> TableValues<'v> {
     }
 }
 
-/// A key's path in settings: `snow.noise.size`, `object[1].scale`.
-pub fn path(key: &Key, object: Option<usize>) -> String {
-    match object {
+/// A key's path in settings: `snow.noise.size`, `object[1].scale`; `index` is from 0.
+pub fn key_path(key: &Key, index: Option<usize>) -> String {
+    match index {
         None => format!("{}.{}", key.table, key.name),
         Some(index) => format!("{}[{}].{}", key.table, index + 1, key.name),
     }
@@ -154,13 +153,13 @@ impl Values {
         self.keys
     }
 
-    /// Reads the keys of a table, with its index if there may be many, and fills in defaults, even if the table is missing.
+    /// Reads the keys of a table and fills in defaults, even if the table is missing; `index` is its index in an array of tables.
     ///
     /// # Errors
     /// A key that is missing, a wrong type or a value out of range, with file and line.
-    pub(in crate::scene) fn read(&mut self, name: &str, object: Option<usize>, table: &Table) -> Result<()> {
+    pub(in crate::scene) fn read(&mut self, name: &str, index: Option<usize>, table: &Table) -> Result<()> {
         for (position, key) in self.keys.iter().enumerate().filter(|(_, key)| key.table == name) {
-            let allowed = !key.of_characters || self.path_of(object, name, "file").is_some_and(is_gltf);
+            let allowed = !key.of_characters || self.path_of(index, name, "file").is_some_and(is_gltf);
             if !allowed && table.has(key.name) {
                 return Err(table.error(key.name, "is for .glb and .gltf files: leave it out"));
             }
@@ -171,7 +170,7 @@ impl Values {
                 None => None,
             };
             if let Some(value) = value {
-                self.values.insert((object, position), value);
+                self.values.insert((index, position), value);
             }
         }
         Ok(())
@@ -180,39 +179,39 @@ impl Values {
     /// A key's value in the preset that its table names.
     fn preset(&self, key: &Key) -> Option<&'static str> {
         let chosen =
-            ["preset", "liquid"].into_iter().find_map(|name| self.of(None, key.table, name))?.text()?;
+            ["preset", "liquid"].into_iter().find_map(|name| self.find(None, key.table, name))?.text()?;
         key.presets.iter().find(|(name, _)| *name == chosen).map(|(_, value)| *value)
     }
 
-    /// Every value with its key and, for tables of which there may be many, the index: single tables first, then index by index, in the
-    /// order of the keys.
+    /// Every value with its key and its table's index in an array of tables: single tables first, then index by index, each in the order
+    /// of the keys.
     pub(in crate::scene) fn iter(&self) -> impl Iterator<Item = (&'static Key, Option<usize>, &Value)> {
-        self.values.iter().map(|((object, position), value)| (&self.keys[*position], *object, value))
+        self.values.iter().map(|((index, position), value)| (&self.keys[*position], *index, value))
     }
 
-    fn of(&self, object: Option<usize>, table: &str, name: &str) -> Option<&Value> {
+    fn find(&self, index: Option<usize>, table: &str, name: &str) -> Option<&Value> {
         let position = self.keys.iter().position(|key| key.table == table && key.name == name)?;
-        self.values.get(&(object, position))
+        self.values.get(&(index, position))
     }
 
     /// A value by its key: `snow.cell`.
     pub fn get(&self, key: &str) -> Option<&Value> {
         let (table, name) = key.rsplit_once('.')?;
-        self.of(None, table, name)
+        self.find(None, table, name)
     }
 
-    /// The values of a table that a scene has once.
+    /// The values of a single table.
     pub fn table<'v>(&'v self, table: &'v str) -> TableValues<'v> {
         TableValues { values: self, table, index: None }
     }
 
-    /// The values of one of many tables of a name; the first has index 0.
-    pub fn one<'v>(&'v self, table: &'v str, index: usize) -> TableValues<'v> {
+    /// The values of an element of an array of tables, counted from 0.
+    pub fn element<'v>(&'v self, table: &'v str, index: usize) -> TableValues<'v> {
         TableValues { values: self, table, index: Some(index) }
     }
 
-    /// A key's default by its declaration, and by its table's preset.
-    pub(in crate::scene) fn declared(&self, table: &str, name: &str) -> Option<Value> {
+    /// A key's default, by its table's preset or else its declaration.
+    pub(in crate::scene) fn declared_default(&self, table: &str, name: &str) -> Option<Value> {
         let key = self.keys.iter().find(|key| key.table == table && key.name == name)?;
         match self.preset(key).map_or(key.fallback, Fallback::Is) {
             Fallback::Is(text) => with_value(key.name, text, |table| read(key, table, None)).ok()?,
@@ -220,7 +219,7 @@ impl Values {
         }
     }
 
-    /// Number of tables of a name, for tables of which there may be many.
+    /// Number of elements of an array of tables.
     pub fn count(&self, table: &str) -> usize {
         let indices = self.iter().filter(|(key, _, _)| key.table == table).filter_map(|(_, index, _)| index);
         indices.max().map_or(0, |last| last + 1)
@@ -231,13 +230,13 @@ impl Values {
         f64::of(self.get(key)?)
     }
 
-    fn path_of(&self, object: Option<usize>, table: &str, name: &str) -> Option<&Path> {
-        self.of(object, table, name)?.path()
+    fn path_of(&self, index: Option<usize>, table: &str, name: &str) -> Option<&Path> {
+        self.find(index, table, name)?.path()
     }
 
     /// Replaces a number.
     pub(in crate::scene) fn set_number(&mut self, key: &str, number: f64) {
-        let position = self.keys.iter().position(|declared| path(declared, None) == key);
+        let position = self.keys.iter().position(|declared| key_path(declared, None) == key);
         let value = position.and_then(|position| self.values.get_mut(&(None, position)));
         if let Some(value) = value {
             *value = Value::Number(number);
@@ -246,10 +245,10 @@ impl Values {
 
     /// All values by their paths in settings: `object[1].scale`.
     pub fn by_path(&self) -> BTreeMap<String, Value> {
-        self.iter().map(|(key, object, value)| (path(key, object), value.clone())).collect()
+        self.iter().map(|(key, index, value)| (key_path(key, index), value.clone())).collect()
     }
 
-    /// Every file that is named.
+    /// The path of every file that the scene names.
     pub(in crate::scene) fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
         self.values.values_mut().filter_map(|value| match value {
             Value::File(path) => Some(path),
@@ -302,26 +301,26 @@ impl fmt::Display for Value {
             Self::Named(numbers) if numbers.is_empty() => f.write_str("{}"),
             Self::Named(numbers) => {
                 let numbers: Vec<String> =
-                    numbers.iter().map(|(name, number)| format!("{} = {number:?}", key_of(name))).collect();
+                    numbers.iter().map(|(name, number)| format!("{} = {number:?}", toml_key(name))).collect();
                 write!(f, "{{ {} }}", numbers.join(", "))
             }
             Self::File(path) => f.write_str(&quoted(&path.to_string_lossy())),
             Self::Poses(poses) => {
-                let poses: Vec<String> = poses.iter().map(pose).collect();
+                let poses: Vec<String> = poses.iter().map(pose_toml).collect();
                 write!(f, "[{}]", poses.join(", "))
             }
         }
     }
 }
 
-/// A pose as a scene writes it.
-pub fn pose(pose: &KeyPose) -> String {
+/// A pose in TOML.
+pub fn pose_toml(pose: &KeyPose) -> String {
     let KeyPose { frame, at, turn_deg } = pose;
     format!("{{ frame = {frame:?}, at = {at:?}, turn_deg = {turn_deg:?} }}")
 }
 
-/// A name as a key of TOML.
-fn key_of(name: &str) -> String {
+/// A name as a TOML key.
+fn toml_key(name: &str) -> String {
     let is_bare = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'_';
     if !name.is_empty() && name.bytes().all(is_bare) { name.to_string() } else { quoted(name) }
 }
@@ -330,7 +329,7 @@ fn quoted(text: &str) -> String {
     toml::Value::String(text.to_string()).to_string()
 }
 
-/// Reads a key; `None` if it is left out.
+/// Reads a key; `None` if it is left out. `cell` is the edge of a cell (m), which [`Kind::Cells`] needs.
 fn read(key: &Key, table: &Table, cell: Option<f64>) -> Result<Option<Value>> {
     let name = key.name;
     Ok(match key.kind {
@@ -351,36 +350,36 @@ fn read(key: &Key, table: &Table, cell: Option<f64>) -> Result<Option<Value>> {
             table.number_in(name, low * cell..=high * cell, &unit)?.map(Value::Number)
         }
         Kind::Whole(low, high) => table.integer_in(name, low..=high)?.map(Value::Whole),
-        Kind::Numbers(count, far, unit) => numbers(name, table, count, far, unit)?,
-        Kind::Named(far) => match table.named_numbers(name)? {
-            Some(named) if named.values().any(|number| number.abs() > far) => {
-                return Err(table.error(name, format!("must hold numbers within {far} of 0")));
+        Kind::Numbers(count, limit, unit) => numbers(name, table, count, limit, unit)?,
+        Kind::Named(limit) => match table.named_numbers(name)? {
+            Some(named) if named.values().any(|number| number.abs() > limit) => {
+                return Err(table.error(name, format!("must hold numbers within {limit} of 0")));
             }
             named => named.map(Value::Named),
         },
         Kind::File(extensions) => {
             table.path(name)?.map(|path| file(key, table, path, extensions, "")).transpose()?
         }
-        Kind::HeightOrFile(far, extensions) => match (table.path(name), table.number(name)) {
+        Kind::HeightOrFile(limit, extensions) => match (table.path(name), table.number(name)) {
             (Ok(Some(path)), _) => Some(file(key, table, path, extensions, "a number or ")?),
             (_, Ok(None)) => None,
-            (_, Ok(Some(height))) if height.abs() <= far => Some(Value::Number(height)),
-            (_, Ok(Some(_))) => return Err(table.error(name, format!("must lie in -{far} to {far} m"))),
+            (_, Ok(Some(height))) if height.abs() <= limit => Some(Value::Number(height)),
+            (_, Ok(Some(_))) => return Err(table.error(name, format!("must lie in -{limit} to {limit} m"))),
             (_, Err(_)) => return Err(table.error(name, "must be a number (m) or the name of a mesh file")),
         },
-        Kind::NumbersOrFile(count, far, unit, extensions) => match table.path(name) {
+        Kind::NumbersOrFile(count, limit, unit, extensions) => match table.path(name) {
             Ok(Some(path)) => Some(file(key, table, path, extensions, &format!("{count} numbers or "))?),
-            _ => numbers(name, table, count, far, unit)?,
+            _ => numbers(name, table, count, limit, unit)?,
         },
-        Kind::Poses(far) if table.has(name) => Some(Value::Poses(poses(name, table, far)?)),
+        Kind::Poses(limit) if table.has(name) => Some(Value::Poses(poses(name, table, limit)?)),
         Kind::Poses(_) => None,
     })
 }
 
-fn numbers(name: &str, table: &Table, count: usize, far: f64, unit: &str) -> Result<Option<Value>> {
+fn numbers(name: &str, table: &Table, count: usize, limit: f64, unit: &str) -> Result<Option<Value>> {
     let numbers = table.numbers(name, count)?;
-    if numbers.iter().flatten().any(|number| number.abs() > far) {
-        return Err(table.error(name, format!("must lie within {far} {unit} of 0")));
+    if numbers.iter().flatten().any(|number| number.abs() > limit) {
+        return Err(table.error(name, format!("must lie within {limit} {unit} of 0")));
     }
     Ok(numbers.map(Value::Numbers))
 }
@@ -389,7 +388,7 @@ fn file(key: &Key, table: &Table, path: PathBuf, extensions: &[&str], or: &str) 
     if extensions.contains(&extension(&path).as_str()) {
         return Ok(Value::File(path));
     }
-    let name = super::name(&path);
+    let name = file_name(&path);
     let advice = particles::advice(&path).filter(|_| extensions.contains(&"bgeo"));
     let advice = advice.map_or(String::new(), |advice| format!(": {advice}"));
     Err(table.error(key.name, format!("must be {or}a {} file, not \"{name}\"{advice}", any_of(extensions))))
@@ -400,7 +399,7 @@ pub fn any_of(extensions: &[&str]) -> String {
     joined(extensions.iter().map(|extension| format!(".{extension}")).collect(), "or")
 }
 
-fn poses(name: &str, object: &Table, far: f64) -> Result<Vec<KeyPose>> {
+fn poses(name: &str, object: &Table, limit: f64) -> Result<Vec<KeyPose>> {
     let mut poses: Vec<KeyPose> = Vec::new();
     for table in object.tables(name, "keys of [[object]]", &["frame", "at", "turn_deg"])? {
         let frame = table.number_in("frame", -1.0e8..=1.0e8, "")?;
@@ -408,14 +407,14 @@ fn poses(name: &str, object: &Table, far: f64) -> Result<Vec<KeyPose>> {
         if poses.last().is_some_and(|before| before.frame >= frame) {
             return Err(table.error("frame", "must be greater than the key's before it"));
         }
-        let triple = |name: &str, far: f64, what: &str| -> Result<[f64; 3]> {
+        let triple = |name: &str, limit: f64, what: &str| -> Result<[f64; 3]> {
             let numbers = table.numbers(name, 3)?.unwrap_or_else(|| vec![0.0; 3]);
-            if numbers.iter().any(|number| number.abs() > far) {
+            if numbers.iter().any(|number| number.abs() > limit) {
                 return Err(table.error(name, what));
             }
             Ok([numbers[0], numbers[1], numbers[2]])
         };
-        let at = triple("at", far, &format!("must lie within {far} m of the origin"))?;
+        let at = triple("at", limit, &format!("must lie within {limit} m of the origin"))?;
         let turn_deg = triple("turn_deg", 1.0e6, "must lie in -1000000 to 1000000 degrees")?;
         poses.push(KeyPose { frame, at, turn_deg });
     }
@@ -438,6 +437,6 @@ fn default(
 }
 
 /// A file's name without its folder.
-pub(in crate::scene) fn name(path: &Path) -> String {
+pub(in crate::scene) fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }

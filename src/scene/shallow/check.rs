@@ -48,9 +48,9 @@ pub struct Report {
     pub void_cells: usize,
     /// Minimum and maximum height of ground and liquid (m).
     pub heights_m: [f64; 2],
-    /// Smallest difference of depths (m).
+    /// Resolution of heights and depths (m).
     pub unit_m: f64,
-    /// Kinematic viscosity (m2/s); at rest if the liquid thins.
+    /// Kinematic viscosity (m2/s); of a thinning liquid at rest.
     pub viscosity_m2_per_s: f64,
     /// Liquid at the first frame (ml).
     pub begins_with_ml: f64,
@@ -68,7 +68,7 @@ pub struct Report {
     pub disk_bytes: u64,
     /// Maximum size of the files of a frame (bytes).
     pub frame_bytes: u64,
-    /// Probable mistakes, one sentence each.
+    /// Probable mistakes in the scene, one sentence each.
     pub warnings: Vec<String>,
     /// Every setting, defaults filled in.
     pub settings: BTreeMap<String, Value>,
@@ -92,26 +92,26 @@ impl Report {
 /// # Errors
 /// A file that cannot be read; a source inside solid, and anything else that a run would refuse; cancel.
 pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
-    let (of, frames) = (scene.shallow()?, scene.shot.frames);
-    let course = LiquidState::begin(ctx, (scene, of, inputs))?;
-    let columns = course.liquid.columns();
+    let (setup, frames) = (scene.shallow()?, scene.shot.frames);
+    let state = LiquidState::begin(ctx, (scene, setup, inputs))?;
+    let columns = state.liquid.columns();
     let (grid, heights) = (inputs.grid, inputs.heights);
     let [low, high] = inputs.bounds;
     let layers = (0..grid.cells()).map(|cell| inputs.solids.cell(cell).len());
     let void_cells = layers.clone().filter(|layers| *layers == 0).count();
-    let begins_with = course.liquid.balance().inside;
-    let deepest = course.liquid.depths().iter().copied().max().unwrap_or(0);
+    let begins_with = state.liquid.balance().inside;
+    let deepest = state.liquid.depths().iter().copied().max().unwrap_or(0);
     let count = columns.count();
     let triangles = inputs.triangles.unwrap_or(0) as u64;
-    let frame_bytes = estimate::frame_bytes(of, count as u64, triangles);
+    let frame_bytes = estimate::frame_bytes(setup, count as u64, triangles);
     let mut warnings = inputs.warnings.clone();
-    warnings.extend(odd(of, inputs, &course, void_cells));
-    warnings.extend(later(ctx, scene, course)?);
+    warnings.extend(probable_mistakes(setup, inputs, &state, void_cells));
+    warnings.extend(warnings_of_later_frames(ctx, scene, state)?);
     Ok(Report {
         frames: [frames.first, frames.last],
         fps: scene.shot.fps,
-        terrain: crate::scene::schema::name(&of.terrain_at(frames.first)),
-        files: if of.sequence().is_some() { frames.count() } else { 1 },
+        terrain: crate::scene::schema::file_name(&setup.terrain_at(frames.first)),
+        files: if setup.sequence().is_some() { frames.count() } else { 1 },
         triangles: inputs.triangles,
         size_m: (high - low).into(),
         cell_m: grid.cell,
@@ -122,13 +122,13 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
         void_cells,
         heights_m: [heights.low, heights.metres(TOP)],
         unit_m: heights.unit,
-        viscosity_m2_per_s: of.params.liquid.viscosity,
+        viscosity_m2_per_s: setup.params.liquid.viscosity,
         begins_with_ml: begins_with / ML,
-        comes_ml: comes(scene, of) / ML,
+        comes_ml: added_volume(scene, setup) / ML,
         deepest_m: heights.length(deepest.into()),
-        falls: of.params.falls.is_some(),
-        scalars: of.scalars.iter().map(|carried| carried.scalar.name.clone()).collect(),
-        memory_bytes: estimate::memory(of, &grid, count as u64, triangles),
+        falls: setup.params.falls.is_some(),
+        scalars: setup.scalars.iter().map(|carried| carried.scalar.name.clone()).collect(),
+        memory_bytes: estimate::memory(setup, &grid, count as u64, triangles),
         disk_bytes: frames.count() as u64 * frame_bytes,
         frame_bytes,
         warnings,
@@ -136,14 +136,14 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     })
 }
 
-/// Steps through terrain, obstacles and points of all later frames; a sentence for each point that should act but is resting.
-fn later(ctx: &Context, scene: &Scene, mut course: LiquidState<'_>) -> Result<Vec<String>> {
-    // By name: the first frame, and the number of frames.
+/// Moves terrain, obstacles and points through all later frames; returns a sentence for each point that rests while it should be active.
+fn warnings_of_later_frames(ctx: &Context, scene: &Scene, mut state: LiquidState<'_>) -> Result<Vec<String>> {
+    // The first such frame and the number of such frames, by the point's name.
     let mut resting: BTreeMap<String, (i32, usize)> = BTreeMap::new();
     for frame in scene.shot.frames.iter().skip(1) {
         ctx.check()?;
-        course.go_still()?;
-        for name in course.resting() {
+        state.advance_without_flow()?;
+        for name in state.resting() {
             resting.entry(name).or_insert((frame, 0)).1 += 1;
         }
     }
@@ -156,11 +156,11 @@ fn later(ctx: &Context, scene: &Scene, mut course: LiquidState<'_>) -> Result<Ve
 }
 
 /// Liquid added after the first frame (m3).
-fn comes(scene: &Scene, of: &Shallow) -> f64 {
+fn added_volume(scene: &Scene, setup: &Shallow) -> f64 {
     let frames = scene.shot.frames;
     let later = |frame: i32| frame > frames.first && frame <= frames.last;
-    let poured = of.pours.iter().filter(|pour| pour.frame.is_some_and(later)).map(|pour| pour.volume);
-    let sources = of.points.iter().filter(|point| point.point.kind == Kind::Source);
+    let poured = setup.pours.iter().filter(|pour| pour.frame.is_some_and(later)).map(|pour| pour.volume);
+    let sources = setup.points.iter().filter(|point| point.point.kind == Kind::Source);
     let sourced = sources.map(|point| {
         let from = point.from.unwrap_or(frames.first).max(frames.first + 1);
         let to = point.until.unwrap_or(frames.last).min(frames.last);
@@ -171,7 +171,12 @@ fn comes(scene: &Scene, of: &Shallow) -> f64 {
 }
 
 /// Probable mistakes.
-fn odd(of: &Shallow, inputs: &Inputs, course: &LiquidState<'_>, void_cells: usize) -> Vec<String> {
+fn probable_mistakes(
+    setup: &Shallow,
+    inputs: &Inputs,
+    state: &LiquidState<'_>,
+    void_cells: usize,
+) -> Vec<String> {
     let mut out = Vec::new();
     let (grid, heights) = (inputs.grid, inputs.heights);
     let share = void_cells as f64 / grid.cells() as f64;
@@ -194,24 +199,24 @@ fn odd(of: &Shallow, inputs: &Inputs, course: &LiquidState<'_>, void_cells: usiz
             heights.metres(TOP)
         ));
     }
-    let depths = course.liquid.depths();
-    let columns = course.liquid.columns();
+    let depths = state.liquid.depths();
+    let columns = state.liquid.columns();
     let is_border = |index: usize| {
         let [x, z] = columns.cell(index);
         x == 0 || z == 0 || x + 1 == grid.size[0] || z + 1 == grid.size[1]
     };
-    let fills = of.fill.is_some() && of.params.border == Border::Open;
+    let fills = setup.fill.is_some() && setup.params.border == Border::Open;
     if fills && columns.indices().any(|index| depths[index] > 0 && is_border(index)) {
         out.push(
             "what stands up to shallow.fill flows off at the border, which is open: \"closed\" or \"absorbing\" keep it".into(),
         );
     }
-    for (index, carried) in of.scalars.iter().enumerate() {
+    for (index, carried) in setup.scalars.iter().enumerate() {
         let name = &carried.scalar.name;
         let has = |carries: &Vec<f64>| carries[index] != 0.0;
-        let sources = of.points.iter().filter(|point| point.point.kind == Kind::Source);
+        let sources = setup.points.iter().filter(|point| point.point.kind == Kind::Source);
         let is_brought =
-            sources.map(|point| &point.carries).chain(of.pours.iter().map(|pour| &pour.carries)).any(has);
+            sources.map(|point| &point.carries).chain(setup.pours.iter().map(|pour| &pour.carries)).any(has);
         if carried.scalar.law != Law::Ages && carried.start == 0.0 && !is_brought {
             out.push(format!(
                 "no liquid has any {name}: carries = {{ {name} = 1.0 }} of a [[pour]] or [[source]], or start of scalar.{}, gives it some",
@@ -219,7 +224,7 @@ fn odd(of: &Shallow, inputs: &Inputs, course: &LiquidState<'_>, void_cells: usiz
             ));
         }
     }
-    if of.points.is_empty() && of.pours.is_empty() && of.fill.is_none() {
+    if setup.points.is_empty() && setup.pours.is_empty() && setup.fill.is_none() {
         out.push("there is no liquid: no [[pour]], no [[source]], no shallow.fill".into());
     }
     if grid.cells() < FEW {

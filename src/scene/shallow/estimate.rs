@@ -1,4 +1,4 @@
-//! Memory and disk space of a liquid on a terrain, estimated before any is used. Disk space is the maximum: when all of it is wet.
+//! Estimated memory and disk space of a liquid on a terrain. Disk space is the maximum, as if all columns were wet.
 
 use crate::context::Context;
 use crate::error::Result;
@@ -9,27 +9,25 @@ use crate::shallow::params::Friction;
 
 /// Bytes that every run takes.
 const FIXED: u64 = 32_000_000;
-/// Bytes of a cell during conversion of the terrain to columns: its crossings and solids, in two copies.
+/// Bytes of a cell while the terrain is converted to columns: its crossings and solids, in two copies.
 const CELL: u64 = 64;
-/// Bytes of a column: liquid, pipes and data of steps 100; its vertex and triangles while they are made 150; up to three steps that wait
-/// for the writer, 120 each; files and states 100; minimum heights 20.
+/// Bytes of a column: liquid, pipes and scratch data 100; its vertex and triangles while they are made 150; in up to three steps that wait
+/// for the writer, 120 each; in files and states 100; minimum heights 20.
 const COLUMN: u64 = 730;
-/// Bytes of a scalar in a column: its amount 8, its concentration 4, and 50 in those steps, files and states.
+/// Bytes of a scalar in a column: its amount 8, its concentration 4, and 50 in waiting steps, files and states.
 const SCALAR: u64 = 62;
 /// Additional bytes of a column for friction at walls, and for viscosity that depends on a scalar.
 const WALLS: u64 = 108;
 const THICK: u64 = 12;
-/// Bytes of a drop: its own data 500; its ball and strand while they are made, and in up to three steps that wait for the writer, 5,600
-/// each.
+/// Bytes of a drop: its own data 500; its ball and strand 5,600, while they are made and in up to three steps that wait for the writer.
 const DROP: u64 = 22_900;
-/// Bytes of a triangle of the terrain: corners and a position, twice while it is read or while minimum heights are found, and the data that
-/// these need.
+/// Bytes of a triangle of the terrain: corners and a position, in two copies and with scratch data while it is read or while minimum
+/// heights are found.
 const TRIANGLE: u64 = 110;
-
 /// Additional bytes of a triangle that the liquid stains: stains, and the mesh in up to three steps that wait for the writer.
 const STAINED: u64 = 110;
 
-/// Refuses more cells than the context's memory limit allows, before they are made.
+/// Fails, before the cells are made, if they would exceed the context's memory limit.
 ///
 /// # Errors
 /// [`crate::Error::Memory`], naming the cells.
@@ -40,12 +38,12 @@ pub(in crate::scene::shallow) fn allow_cells(ctx: &Context, grid: &Grid) -> Resu
 }
 
 /// Estimated bytes of a run.
-pub(in crate::scene::shallow) fn memory(of: &Shallow, grid: &Grid, columns: u64, triangles: u64) -> u64 {
-    let walls = if of.params.friction == Friction::Walls { WALLS } else { 0 };
-    let thick = if of.params.thickening.is_some() { THICK } else { 0 };
-    let triangle = TRIANGLE + if of.staining.is_some() { STAINED } else { 0 };
-    let column = COLUMN + SCALAR * of.scalars.len() as u64 + walls + thick;
-    let drops = DROP * of.params.falls.map_or(0, |falls| falls.most as u64);
+pub(in crate::scene::shallow) fn memory(setup: &Shallow, grid: &Grid, columns: u64, triangles: u64) -> u64 {
+    let walls = if setup.params.friction == Friction::Walls { WALLS } else { 0 };
+    let thick = if setup.params.thickening.is_some() { THICK } else { 0 };
+    let triangle = TRIANGLE + if setup.staining.is_some() { STAINED } else { 0 };
+    let column = COLUMN + SCALAR * setup.scalars.len() as u64 + walls + thick;
+    let drops = DROP * setup.params.falls.map_or(0, |falls| falls.most as u64);
     FIXED + CELL * grid.cells() as u64 + column * columns + triangle * triangles + drops
 }
 
@@ -56,7 +54,7 @@ const INDEX: u64 = 8;
 const STATE: u64 = 20;
 const STATE_OF_SCALAR: u64 = 8;
 const STATE_OF_DROP: u64 = 220;
-/// Bytes of a voxel of a leaf; there are about two for each column.
+/// Bytes of the voxels of a column, of which there are about two.
 const VOXEL: u64 = 2 * 4;
 /// Bytes of a triangle of a stained terrain: its corners, and for half a vertex the position, the stain, and the stain in the exact state.
 const FILE_OF_STAINED: u64 = 13 + (12 + 4 + 12) / 2;
@@ -65,11 +63,11 @@ const RECORDS: u64 = 3000;
 
 /// Maximum bytes of a frame's files with these counts of columns and triangles of the terrain: if all columns are wet, and the air holds
 /// the maximum number of drops.
-pub(in crate::scene::shallow) fn frame_bytes(of: &Shallow, columns: u64, triangles: u64) -> u64 {
-    let output = of.output;
-    let scalars = of.scalars.len() as u64;
+pub(in crate::scene::shallow) fn frame_bytes(setup: &Shallow, columns: u64, triangles: u64) -> u64 {
+    let output = setup.output;
+    let scalars = setup.scalars.len() as u64;
     let (carried, falling) =
-        (if output.scalars { scalars } else { 0 }, u64::from(output.falling && of.params.falls.is_some()));
+        (if output.scalars { scalars } else { 0 }, u64::from(output.falling && setup.params.falls.is_some()));
     let if_asked = |is_asked: bool, bytes: u64| if is_asked { bytes } else { 0 };
     let arrays = if_asked(output.depth, 4)
         + if_asked(output.alpha, 4)
@@ -84,10 +82,10 @@ pub(in crate::scene::shallow) fn frame_bytes(of: &Shallow, columns: u64, triangl
     let usd = TEXT * numbers + 2 * 3 * INDEX + 2 * 3;
     let state = STATE + STATE_OF_SCALAR * scalars;
     let each = if_asked(output.ply, ply) + if_asked(output.usd, usd) + if_asked(output.vdb, VOXEL) + state;
-    let drops = of.params.falls.map_or(0, |falls| falls.most);
+    let drops = setup.params.falls.map_or(0, |falls| falls.most);
     // For each vertex of its mesh two triangles.
     let in_air = bound(drops).vertices as u64 * (if_asked(output.ply, ply) + if_asked(output.usd, usd));
-    let stained = if_asked(of.staining.is_some(), FILE_OF_STAINED * triangles);
+    let stained = if_asked(setup.staining.is_some(), FILE_OF_STAINED * triangles);
     columns * each + in_air + stained + drops as u64 * STATE_OF_DROP + RECORDS
 }
 
@@ -97,17 +95,17 @@ mod tests {
     use crate::geometry::{TriMesh, Vec3};
     use crate::io::mesh::{Carried, ply_bytes};
     use crate::scene::Scene;
-    use crate::scene::shallow::stage::liquid_mesh::Drawn;
+    use crate::scene::shallow::stage::liquid_mesh::LiquidMesh;
     use std::path::Path;
 
     #[test]
-    fn a_ply_file_is_as_large_as_said_but_for_its_header() {
+    fn a_ply_file_is_as_large_as_estimated_but_for_its_header() {
         let text = "[shot]\nframes = \"1-2\"\n[shallow]\nterrain = \"a.obj\"\ncell = 0.01\nfalls = true\nfalls_most = 1\n\
                     [[scalar]]\nname = \"dye\"\n";
         let scene = Scene::parse(text, Path::new("/s/shot.toml"), &[]).unwrap();
-        let of = scene.shallow().unwrap();
+        let setup = scene.shallow().unwrap();
         let count = 1000;
-        let drawn = Drawn {
+        let surface = LiquidMesh {
             mesh: TriMesh { positions: vec![Vec3::zeros(); count], triangles: vec![[0, 1, 2]; 2 * count] },
             velocities: vec![Vec3::zeros(); count],
             depths: vec![0.0; count],
@@ -116,14 +114,17 @@ mod tests {
             falling: Some(900),
             scalars: vec![("dye".into(), vec![0.0; count])],
         };
-        let arrays = drawn.arrays(of.output);
-        let carried =
-            Carried { velocities: &drawn.velocities, uvs: None, arrays: &arrays.iter().collect::<Vec<_>>() };
-        let bytes = ply_bytes(&drawn.mesh, &carried).len() as u64;
+        let arrays = surface.arrays(setup.output);
+        let carried = Carried {
+            velocities: &surface.velocities,
+            uvs: None,
+            arrays: &arrays.iter().collect::<Vec<_>>(),
+        };
+        let bytes = ply_bytes(&surface.mesh, &carried).len() as u64;
         let more = (STATE + STATE_OF_SCALAR) * count as u64;
-        let said = (frame_bytes(of, count as u64, 9) - frame_bytes(of, 0, 0)) - more;
-        assert!(bytes > said && bytes < said + 500, "{bytes} bytes, {said} said");
-        // A drop has a ball.
-        assert!(frame_bytes(of, 0, 0) > RECORDS + STATE_OF_DROP + 42 * 12, "{}", frame_bytes(of, 0, 0));
+        let estimate = (frame_bytes(setup, count as u64, 9) - frame_bytes(setup, 0, 0)) - more;
+        assert!(bytes > estimate && bytes < estimate + 500, "{bytes} bytes, {estimate} estimated");
+        // The ball of a drop has at least 42 vertices.
+        assert!(frame_bytes(setup, 0, 0) > RECORDS + STATE_OF_DROP + 42 * 12, "{}", frame_bytes(setup, 0, 0));
     }
 }

@@ -1,4 +1,4 @@
-//! The keys of `[shallow]`, of its tables that may occur many times, and of `[output]` in such scenes.
+//! The keys of `[shallow]`, of the arrays of tables and of `[output]` in such scenes.
 
 use crate::io::mesh::EXTENSIONS;
 use crate::scene::schema::declaration::Kind::{
@@ -7,21 +7,22 @@ use crate::scene::schema::declaration::Kind::{
 use crate::scene::schema::declaration::{Key, Kind, OBJECT, Scope, Scopes, key, optional, or, required};
 use crate::scene::schema::{FAR, NO_ORIGIN, ORIGIN, ORIGIN_MEANS};
 
-/// A mesh, a level set or an image of heights.
+/// Extensions of a terrain: a mesh, a level set or an image of heights.
 const TERRAINS: &[&str] = &[EXTENSIONS[0], EXTENSIONS[1], EXTENSIONS[2], "vdb", "png"];
 /// Maximum of a volume, and of a rate (ml, ml/s): a cubic kilometre.
-const MOST_ML: f64 = 1.0e15;
+const MAX_ML: f64 = 1.0e15;
 /// Frame numbers allowed in a scene.
 const FRAMES: Kind = Kind::Whole(-1_000_000_000, 1_000_000_000);
 /// Lengths of obstacles, and radii of circles (m).
 const LENGTH: Kind = Kind::Number(0.0, FAR, "m");
 
-/// Concentrations by the names of scalars.
-const NAMED: Kind = Kind::Named(1.0e9);
+/// Concentrations by names of scalars.
+const CONCENTRATIONS: Kind = Kind::Named(1.0e9);
+/// Meaning of `carries`.
 const CARRIES: &str =
     "concentrations of scalars in it, by name; for scalars that are not named: their `start`";
 
-/// For sources, drains and absorbers.
+/// Meaning of `follows` of sources, drains and absorbers.
 const FOLLOWS: &str =
     "true: it moves with the point of the terrain, a sequence, that is nearest to `at` at the first frame";
 
@@ -77,7 +78,7 @@ pub const KEYS: &[Key] = &[
         .means("true: liquid falls freely over edges, through holes and into the void, in drops and strands; false: it arrives below at once"),
     key(FIRST, "shallow", "falls_height", LENGTH, or("0.01"))
         .means("minimum height of a free fall (m); at least the edge of a cell"),
-    key(FIRST, "shallow", "falls_drop_ml", Number(0.0, MOST_ML, "ml"), or("6.5e-5"))
+    key(FIRST, "shallow", "falls_drop_ml", Number(0.0, MAX_ML, "ml"), or("6.5e-5"))
         .means("volume of a drop (ml): liquid drips where a drop takes longer than 8 intervals to form"),
     key(FIRST, "shallow", "falls_interval", Number(1.0e-4, 1.0, "s"), or("0.008333333333333333"))
         .means("time between the drops of a strand (s)"),
@@ -96,7 +97,7 @@ pub const KEYS: &[Key] = &[
         .means("depth from which the liquid is opaque (m)"),
 ];
 
-/// The keys of tables that may occur many times, and of the output.
+/// The keys of the arrays of tables (`[[scalar]]` to `[[object]]`), and of `[output]`.
 pub const TABLE_ARRAY_KEYS: &[Key] = &[
     key(FIRST, "scalar", "name", Text, required("\"dye\""))
         .means("name of a scalar that the liquid carries, up to four, and of its array on the surface's vertices; letters, digits and _"),
@@ -120,16 +121,16 @@ pub const TABLE_ARRAY_KEYS: &[Key] = &[
         .means("centre (m): liquid is poured onto the ground nearest to it"),
     key(STEP, "pour", "radius", LENGTH, required("0.005"))
         .means("of the circle that it is poured into, seen from above (m)"),
-    key(STEP, "pour", "volume_ml", Number(0.0, MOST_ML, "ml"), required("1.0")).means("volume of the pour (ml)"),
-    key(STEP, "pour", "carries", NAMED, or("{}").such_as("{ dye = 1.0 }")).means(CARRIES),
+    key(STEP, "pour", "volume_ml", Number(0.0, MAX_ML, "ml"), required("1.0")).means("volume of the pour (ml)"),
+    key(STEP, "pour", "carries", CONCENTRATIONS, or("{}").such_as("{ dye = 1.0 }")).means(CARRIES),
     key(STEP, "pour", "frame", FRAMES, optional("1")).means("frame of the pour; default: the first"),
     key(STEP, "source", "at", Numbers(3, FAR, "m"), required("[0.0, 0.05, 0.0]").shown())
         .means("centre (m): liquid comes onto the ground nearest to it"),
     key(STEP, "source", "radius", LENGTH, required("0.002").shown())
         .means("of the source's circle, seen from above (m)"),
-    key(STEP, "source", "rate_ml", Number(0.0, MOST_ML, "ml/s"), required("0.5").shown())
+    key(STEP, "source", "rate_ml", Number(0.0, MAX_ML, "ml/s"), required("0.5").shown())
         .means("volume that comes in per second (ml)"),
-    key(STEP, "source", "carries", NAMED, or("{}").such_as("{ dye = 1.0 }")).means(CARRIES),
+    key(STEP, "source", "carries", CONCENTRATIONS, or("{}").such_as("{ dye = 1.0 }")).means(CARRIES),
     key(STEP, "source", "from", FRAMES, optional("1")).means("first frame; default: from the beginning"),
     key(STEP, "source", "until", FRAMES, optional("120")).means("last frame; default: to the end"),
     key(STEP, "source", "follows", Flag, or("false")).means(FOLLOWS),
@@ -140,7 +141,7 @@ pub const TABLE_ARRAY_KEYS: &[Key] = &[
     key(STEP, "drain", "at", Numbers(3, FAR, "m"), required("[0.05, 0.0, 0.0]"))
         .means("centre (m): liquid leaves the ground nearest to it"),
     key(STEP, "drain", "radius", LENGTH, required("0.004")).means("of the drain's circle, seen from above (m)"),
-    key(STEP, "drain", "rate_ml", Number(0.0, MOST_ML, "ml/s"), required("0.5"))
+    key(STEP, "drain", "rate_ml", Number(0.0, MAX_ML, "ml/s"), required("0.5"))
         .means("volume that leaves per second (ml), as long as there is liquid"),
     key(STEP, "drain", "orifice_mm2", Number(0.0, 1.0e12, "mm2"), optional("20.0"))
         .means("area of a hole through which liquid drains by its own weight, at most `rate_ml`; default: it is pumped"),
@@ -156,9 +157,9 @@ pub const TABLE_ARRAY_KEYS: &[Key] = &[
     key(STEP, "absorber", "at", Numbers(3, FAR, "m"), required("[0.05, 0.0, 0.0]"))
         .means("centre (m): liquid goes into gauze on the ground nearest to it"),
     key(STEP, "absorber", "radius", LENGTH, required("0.01")).means("of the gauze, seen from above (m)"),
-    key(STEP, "absorber", "rate_ml", Number(0.0, MOST_ML, "ml/s"), required("0.5"))
+    key(STEP, "absorber", "rate_ml", Number(0.0, MAX_ML, "ml/s"), required("0.5"))
         .means("volume that it absorbs per second (ml)"),
-    key(STEP, "absorber", "capacity_ml", Number(0.0, MOST_ML, "ml"), required("2.0"))
+    key(STEP, "absorber", "capacity_ml", Number(0.0, MAX_ML, "ml"), required("2.0"))
         .means("volume that it can hold (ml)"),
     key(STEP, "absorber", "from", FRAMES, optional("1")).means("first frame; default: from the beginning"),
     key(STEP, "absorber", "until", FRAMES, optional("120")).means("last frame; default: to the end"),

@@ -1,6 +1,5 @@
-//! A little liquid on a terrain in scenes: the keys of `[shallow]` and of the tables beside it, the contents of its files ([`Inputs`]), the
-//! check ([`check`]), estimates of memory and disk space, the stage `liquid` (`stage/`), and the surroundings for a picture of it
-//! ([`Surroundings`]).
+//! Scenes of a little liquid on a terrain: their keys, the contents of their files ([`Inputs`]), the check ([`check`]), estimates of
+//! memory and disk space, the stage `liquid` (`stage/`), and the surroundings for a picture ([`Surroundings`]).
 
 mod check;
 mod estimate;
@@ -14,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 pub use check::{Report, check};
 pub use inputs::Inputs;
-pub use inputs::scalars::Carried;
+pub use inputs::scalars::SceneScalar;
 pub(super) use keys::{KEYS, TABLE_ARRAY_KEYS};
 pub use pipeline::pipeline;
 pub use surroundings::Surroundings;
@@ -37,10 +36,10 @@ pub const ML: f64 = 1.0e-6;
 /// A liquid that flows over a terrain, and its output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shallow {
-    /// A mesh, the pattern of a sequence of a moving mesh, a level set or an image of heights.
+    /// File of a mesh, of a level set or of an image of heights, or the pattern of a sequence of a moving mesh.
     pub terrain: PathBuf,
     /// Placement of an image on the ground.
-    pub image: Option<ImagePlace>,
+    pub image: Option<ImagePlacement>,
     /// A mesh's unit and upward axis.
     pub space: Space,
     /// A sequence starts this many frames later.
@@ -49,39 +48,39 @@ pub struct Shallow {
     pub cell: f64,
     /// Minimum and maximum x and z of the cells, `[x0, z0, x1, z1]` (m); `None`: those of the terrain.
     pub area: Option<[f64; 4]>,
-    /// Minimum height (m); `None`: from the terrain.
+    /// Minimum height of ground and liquid (m); `None`: from the terrain.
     pub bottom: Option<f64>,
-    /// Maximum height (m); `None`: from the terrain.
+    /// Maximum height of ground and liquid (m); `None`: from the terrain.
     pub top: Option<f64>,
     /// Its look: water, blood, paint or honey.
     pub look: String,
-    /// How it flows.
+    /// Parameters of the flow.
     pub params: Params,
     /// Height up to which it stands at the first frame (m).
     pub fill: Option<f64>,
     /// The scalars that the liquid carries.
-    pub scalars: Vec<Carried>,
+    pub scalars: Vec<SceneScalar>,
     /// Liquid poured at given frames.
     pub pours: Vec<Pour>,
     /// Sources, then drains, then absorbers, each in the file's order.
-    pub points: Vec<Point>,
+    pub points: Vec<TimedFlowPoint>,
     /// Obstacles, at rest or moving.
     pub obstacles: Vec<Obstacle>,
-    /// How it stains a terrain that is a mesh, which is then written; `None`: not at all.
+    /// How it stains a terrain that is a mesh; the stained terrain is then written. `None`: not at all.
     pub staining: Option<Staining>,
     /// Whether films get minimum heights, so that a terrain that is a mesh does not show through.
-    pub lifts: bool,
+    pub minimum_heights: bool,
     /// Whether the surface comes down where the ground ends.
     pub skirts: bool,
     /// Depth from which it is opaque (m).
     pub opaque_depth: f64,
     /// Which files are written.
-    pub output: Files,
+    pub output: OutputFiles,
 }
 
 /// How an image of heights is placed around the origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ImagePlace {
+pub struct ImagePlacement {
     /// Lengths along x and z (m).
     pub size: [f64; 2],
     /// Heights of black and of white (m).
@@ -103,14 +102,14 @@ pub struct Pour {
     pub carries: Vec<f64>,
 }
 
-/// A source, a drain or an absorber, active at some frames.
+/// A source, a drain or an absorber with the frames at which it is active.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Point {
+pub struct TimedFlowPoint {
     /// Its table, `source`, and its index there, from 0.
     pub name: (&'static str, usize),
-    /// The flow point itself; if it follows the terrain, before it is attached to that.
+    /// The flow point; if it follows the terrain, its position before it is attached.
     pub point: FlowPoint,
-    /// Concentrations of the scalars in what a source brings.
+    /// Concentrations of the scalars in the liquid of a source.
     pub carries: Vec<f64>,
     /// Whether it moves with the terrain.
     pub follows: bool,
@@ -124,16 +123,16 @@ pub struct Point {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Obstacle {
     /// Its shape.
-    pub form: Form,
+    pub shape: ObstacleShape,
     /// Its poses at frames, ascending; may be empty.
     pub keys: Vec<KeyPose>,
     /// Whether the motion between keys is eased.
     pub ease: bool,
 }
 
-/// The shape of an obstacle, around the origin.
+/// The shape of an obstacle, centred at the origin.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Form {
+pub enum ObstacleShape {
     /// A sphere of this radius (m).
     Sphere(f64),
     /// A capsule along y: its radius, and the distance between the centres of its ends (m).
@@ -146,7 +145,7 @@ pub enum Form {
 
 /// Which files and arrays are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Files {
+pub struct OutputFiles {
     /// `liquid/liquid.%04d.ply`.
     pub ply: bool,
     /// `liquid/liquid.%04d.usda`.
@@ -161,20 +160,20 @@ pub struct Files {
     pub layer: bool,
     /// Opacities.
     pub alpha: bool,
-    /// Whether vertices are in the air.
+    /// Whether each vertex is in the air.
     pub falling: bool,
     /// Concentrations of scalars.
     pub scalars: bool,
 }
 
 impl Shallow {
-    /// The liquid of a scene; `None` if it has no such table.
+    /// The liquid of a scene; `None` without `[shallow]`.
     pub(super) fn of(values: &Values) -> Option<Self> {
         let (own, output) = (values.table("shallow"), values.table("output"));
         let (size, heights) = (own.find("terrain_size"), own.find("terrain_height"));
         Some(Self {
             terrain: own.find("terrain")?,
-            image: size.zip(heights).map(|(size, heights)| ImagePlace { size, heights }),
+            image: size.zip(heights).map(|(size, heights)| ImagePlacement { size, heights }),
             space: own.space(),
             offset: own.get("offset"),
             cell: own.find("cell")?,
@@ -184,19 +183,19 @@ impl Shallow {
             look: own.get("liquid"),
             params: params(values),
             fill: own.find("fill"),
-            scalars: Carried::all_of(values),
+            scalars: SceneScalar::all_of(values),
             pours: (0..values.count("pour")).map(|index| Pour::of(values, index)).collect(),
-            points: Point::all_of(values),
+            points: TimedFlowPoint::all_of(values),
             obstacles: (0..values.count(OBJECT)).filter_map(|index| Obstacle::of(values, index)).collect(),
             staining: own.get::<bool>("stains").then(|| Staining {
                 scalar: inputs::scalars::staining(values),
                 half_life: own.get("stain_half_life"),
                 ..Staining::default()
             }),
-            lifts: own.get("lifts"),
+            minimum_heights: own.get("lifts"),
             skirts: own.get("skirts"),
             opaque_depth: own.get("opaque_depth"),
-            output: Files {
+            output: OutputFiles {
                 ply: output.holds("liquid", "ply"),
                 usd: output.holds("liquid", "usd"),
                 vdb: output.holds("volume", "vdb"),
@@ -226,26 +225,26 @@ impl Shallow {
 
 impl Pour {
     fn of(values: &Values, index: usize) -> Self {
-        let own = values.one("pour", index);
+        let own = values.element("pour", index);
         Self {
             at: own.get("at"),
             radius: own.get("radius"),
             volume: own.get::<f64>("volume_ml") * ML,
             frame: own.find("frame"),
-            carries: inputs::scalars::brought(values, "pour", index),
+            carries: inputs::scalars::concentrations(values, "pour", index),
         }
     }
 }
 
-impl Point {
+impl TimedFlowPoint {
     fn all_of(values: &Values) -> Vec<Self> {
-        let of =
+        let all =
             |table: &'static str| (0..values.count(table)).map(move |index| Self::of(values, table, index));
-        of("source").chain(of("drain")).chain(of("absorber")).collect()
+        all("source").chain(all("drain")).chain(all("absorber")).collect()
     }
 
     fn of(values: &Values, table: &'static str, index: usize) -> Self {
-        let own = values.one(table, index);
+        let own = values.element(table, index);
         let kind = match table {
             "source" => sources::Kind::Source,
             "drain" => match own.find::<f64>("orifice_mm2") {
@@ -268,15 +267,15 @@ impl Point {
         Self {
             name: (table, index),
             point,
-            carries: inputs::scalars::brought(values, table, index),
+            carries: inputs::scalars::concentrations(values, table, index),
             follows: own.get("follows"),
             from: own.find("from"),
             until: own.find("until"),
         }
     }
 
-    /// Whether it acts over the step to a frame.
-    pub(super) fn acts(&self, frame: i32) -> bool {
+    /// Whether it is active over the step to a frame.
+    pub(super) fn is_active(&self, frame: i32) -> bool {
         self.from.is_none_or(|from| from <= frame) && self.until.is_none_or(|until| frame <= until)
     }
 
@@ -288,19 +287,19 @@ impl Point {
 
 impl Obstacle {
     fn of(values: &Values, index: usize) -> Option<Self> {
-        let own = values.one(OBJECT, index);
-        let form = match own.text("shape") {
-            Some("sphere") => Form::Sphere(own.find("radius")?),
-            Some("capsule") => Form::Capsule(own.find("radius")?, own.find("length")?),
-            Some(_) => Form::Cuboid(own.find("size")?),
-            None => Form::Mesh(own.find("file")?, own.space()),
+        let own = values.element(OBJECT, index);
+        let shape = match own.text("shape") {
+            Some("sphere") => ObstacleShape::Sphere(own.find("radius")?),
+            Some("capsule") => ObstacleShape::Capsule(own.find("radius")?, own.find("length")?),
+            Some(_) => ObstacleShape::Cuboid(own.find("size")?),
+            None => ObstacleShape::Mesh(own.find("file")?, own.space()),
         };
-        Some(Self { form, keys: own.get("keys"), ease: own.get("ease") })
+        Some(Self { shape, keys: own.get("keys"), ease: own.get("ease") })
     }
 
     /// The file of a mesh.
     pub(super) fn file(&self) -> Option<&Path> {
-        if let Form::Mesh(path, _) = &self.form { Some(path) } else { None }
+        if let ObstacleShape::Mesh(path, _) = &self.shape { Some(path) } else { None }
     }
 }
 
@@ -333,7 +332,7 @@ fn params(values: &Values) -> Params {
     }
 }
 
-/// Objects of such a scene have no roles.
+/// Roles of objects that matter to settings: the objects of such a scene have none.
 const ROLES: &[Role] = &[];
 
 #[cfg(test)]
@@ -369,28 +368,28 @@ mod tests {
     }
 
     #[test]
-    fn what_there_may_be_many_of_keeps_its_order_through_the_resolved_scene() {
-        let of = "[[source]]\nat = [0, 0, 0]\nradius = 1\nrate_ml = 2\nfrom = 3\nuntil = 4\n\
+    fn arrays_of_tables_keep_their_order_through_the_resolved_scene() {
+        let lines = "[[source]]\nat = [0, 0, 0]\nradius = 1\nrate_ml = 2\nfrom = 3\nuntil = 4\n\
                   [[source]]\nat = [5, 0, 0]\nradius = 0\nrate_ml = 1\nfrequency = 2\nswing = 0.5\n\
                   [[drain]]\nat = [1, 2, 3]\nradius = 1\nrate_ml = 7\n\
                   [[pour]]\nat = [0, 1, 0]\nradius = 0.1\nvolume_ml = 3\n\
                   [[object]]\nshape = \"sphere\"\nradius = 0.5\nkeys = [{ frame = 1, at = [0, 1, 0] }]\n\
                   [[object]]\nfile = \"stone.obj\"\nscale = 0.001\n";
-        let first = scene(of);
+        let first = scene(lines);
         let shallow = first.shallow().unwrap();
-        let titles: Vec<String> = shallow.points.iter().map(Point::title).collect();
+        let titles: Vec<String> = shallow.points.iter().map(TimedFlowPoint::title).collect();
         assert_eq!(titles, ["source.1", "source.2", "drain.1"]);
-        let acts = |frame| shallow.points[0].acts(frame);
-        assert_eq!([2, 3, 4, 5].map(acts), [false, true, true, false]);
+        let is_active = |frame| shallow.points[0].is_active(frame);
+        assert_eq!([2, 3, 4, 5].map(is_active), [false, true, true, false]);
         assert_eq!(shallow.pours[0].volume, 3e-6);
-        assert!(matches!(shallow.obstacles[0].form, Form::Sphere(radius) if radius == 0.5));
+        assert!(matches!(shallow.obstacles[0].shape, ObstacleShape::Sphere(radius) if radius == 0.5));
         assert_eq!(shallow.obstacles[1].file(), Some(Path::new("/s/stone.obj")));
         let again = Scene::parse(&first.to_toml(), Path::new("/s/shot.toml"), &[]).unwrap();
         assert_eq!(again, first);
     }
 
     #[test]
-    fn the_scene_to_begin_with_holds_what_its_keys_may_hold() {
+    fn values_of_the_starter_scene_are_valid() {
         let shown = template(System::Shallow);
         let text: Vec<&str> = shown
             .lines()

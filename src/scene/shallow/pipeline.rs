@@ -14,6 +14,6 @@ use crate::scene::run::Pipeline;
 /// A scene without one; a source inside solid, before anything is written; cancel.
 pub fn pipeline<'a>(ctx: &Context, scene: &'a Scene, inputs: &'a Inputs) -> Result<Pipeline<'a>> {
     LiquidState::begin(ctx, (scene, scene.shallow()?, inputs))?;
-    let stage = Liquid { scene, of: scene.shallow()?, inputs };
+    let stage = Liquid { scene, setup: scene.shallow()?, inputs };
     Ok(Pipeline { scene, input_hashes: &inputs.input_hashes, stages: vec![Box::new(stage)] })
 }

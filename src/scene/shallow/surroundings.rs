@@ -12,7 +12,7 @@ use crate::scene::Scene;
 pub struct Surroundings {
     /// The terrain.
     pub terrain: TriMesh,
-    /// The obstacles, one mesh each; those from files come first.
+    /// A mesh for each obstacle; those from files come first.
     pub obstacles: Vec<TriMesh>,
     /// Number of meshes from files.
     pub meshes: usize,
@@ -33,15 +33,15 @@ impl Surroundings {
     /// # Errors
     /// As there.
     pub fn with_terrain(terrain: TriMesh, scene: &Scene, frame: i32) -> Result<Self> {
-        let of = scene.shallow()?;
-        let mut obstacles = obstacles::meshes(of, scene.shot.frames.first, &InputHashes::default())?;
+        let setup = scene.shallow()?;
+        let mut obstacles = obstacles::meshes(setup, scene.shot.frames.first, &InputHashes::default())?;
         let meshes = obstacles.len();
-        obstacles.extend(obstacles::shapes_at(of, frame)?.iter().map(obstacles::drawn));
+        obstacles.extend(obstacles::shapes_at(setup, frame)?.iter().map(obstacles::shape_mesh));
         Ok(Self { terrain, obstacles, meshes })
     }
 
     /// Whether the terrain changes from frame to frame.
     pub fn moves(scene: &Scene) -> bool {
-        scene.shallow().is_ok_and(|of| of.sequence().is_some())
+        scene.shallow().is_ok_and(|setup| setup.sequence().is_some())
     }
 }

@@ -195,7 +195,7 @@ impl Inputs {
             let (low, high) = mesh.bounds()?;
             let far = (low.cast::<f64>() - middle).abs().sup(&(high.cast::<f64>() - middle).abs()).max();
             // The origin of the layer's lattice is the mean of the ground's vertices, which may differ from its centre.
-            let what = format!("object {} ({}), static, reaches", index + 1, schema::name(&object.file));
+            let what = format!("object {} ({}), static, reaches", index + 1, schema::file_name(&object.file));
             let is_far = far > 0.9 * REACH * self.snow.cell;
             is_far.then(|| sweep::too_far(&what, far, "the middle of the ground", self.snow.cell))
         })
@@ -278,7 +278,7 @@ fn bounds_of(ground: &initial::Ground) -> Option<(DVec3, DVec3)> {
 }
 
 fn object_name(index: usize, object: &Object) -> String {
-    format!("object {} ({})", index + 1, schema::name(&object.file))
+    format!("object {} ({})", index + 1, schema::file_name(&object.file))
 }
 
 /// A mesh with its closed parts outward; adds warnings about what remains ambiguous.

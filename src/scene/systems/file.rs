@@ -53,11 +53,11 @@ impl Scene {
             document.error(offset, error.message().trim().replace('\n', ", "))
         })?;
         for (index, setting) in overrides.iter().enumerate() {
-            setting.apply(root.get_mut(), document.position_of(index), path)?;
+            setting.apply(root.get_mut(), document.offset_of_override(index), path)?;
         }
         let system = System::of(&document, root.get_ref())?;
         let keys = keys_of(system);
-        let root = Table::open(&document, "", root.get_ref(), 0, &known(keys, ""))?;
+        let root = Table::open(&document, "", root.get_ref(), 0, &known_names(keys, ""))?;
         let mut values = Values::new(keys);
         for table in tables(keys).into_iter().filter(|table| !table.contains('.')) {
             read_table(&document, &root, table, &mut values)?;
@@ -77,7 +77,7 @@ impl Scene {
             snow: Snow::of(&values),
             surface: Surface::of(&values),
             shallow: Shallow::of(&values),
-            // Those of a shallow liquid are a different kind of obstacle.
+            // Objects of a shallow liquid are obstacles: see `Shallow::obstacles`.
             objects: if system == System::Shallow { Vec::new() } else { Object::all_of(&values) },
             output: Output::of(&values),
             values,
@@ -101,22 +101,23 @@ impl Scene {
 impl System {
     /// The system whose table a scene has; snow if it has none: the missing table is then reported.
     fn of(document: &Document, root: &DeTable) -> Result<Self> {
-        let position = |system: &Self| root.iter().find(|(key, _)| key.get_ref() == system.name());
-        let span = |system: Self| Some((position(&system)?.0.span().start, system));
-        let mut there: Vec<(usize, Self)> = Self::ALL.into_iter().filter_map(span).collect();
-        there.sort_by_key(|(start, _)| *start);
-        match there[..] {
+        let key = |system: Self| root.keys().find(|key| key.get_ref() == system.name());
+        let offset = |system: Self| Some((key(system)?.span().start, system));
+        let mut present: Vec<(usize, Self)> = Self::ALL.into_iter().filter_map(offset).collect();
+        present.sort_by_key(|(offset, _)| *offset);
+        match present[..] {
             [] => Ok(Self::Snow),
             [(_, system)] => Ok(system),
-            [(_, first), (start, second), ..] => {
+            [(_, first), (offset, second), ..] => {
                 let [first, second] = [first, second].map(Self::name);
-                Err(document.error(start, format!("a scene has one system, not [{first}] and [{second}]")))
+                Err(document.error(offset, format!("a scene has one system, not [{first}] and [{second}]")))
             }
         }
     }
 }
 
-/// Reads a table and the tables in it, or every one of its name. A table with required keys is read only if it is there.
+/// Reads a table and the tables in it, or an array of tables. Of missing tables only `[shot]` is an error here: the caller looks for the
+/// system's own.
 fn read_table<'d>(
     document: &'d Document<'d>,
     root: &Table<'d, '_>,
@@ -125,7 +126,7 @@ fn read_table<'d>(
 ) -> Result<()> {
     let keys = values.keys();
     if is_table_array(name) {
-        let tables = root.tables(name, &heading(name), &known(keys, name))?;
+        let tables = root.tables(name, &heading(name), &known_names(keys, name))?;
         return tables.iter().enumerate().try_for_each(|(index, table)| {
             values.read(name, Some(index), table)?;
             if root.has(System::Shallow.name()) {
@@ -135,7 +136,7 @@ fn read_table<'d>(
             }
         });
     }
-    let table = match root.table(name, &heading(name), &known(keys, name))? {
+    let table = match root.table(name, &heading(name), &known_names(keys, name))? {
         Some(table) => table,
         None if name == "shot" => return Err(root.error(name, "is missing")),
         None if shared_keys::OPTIONAL_TABLES.contains(&name) => return Ok(()),
@@ -148,7 +149,7 @@ fn read_table<'d>(
     check(name, &table, values)?;
     for inner in inner_tables(keys, name) {
         let path = format!("{name}.{inner}");
-        let inner = table.table(inner, &heading(&path), &known(keys, &path))?;
+        let inner = table.table(inner, &heading(&path), &known_names(keys, &path))?;
         let inner = inner.unwrap_or_else(|| Table::absent(document, &heading(&path)));
         values.read(&path, None, &inner)?;
         check(&path, &inner, values)?;
@@ -169,8 +170,8 @@ fn check(name: &str, table: &Table, values: &Values) -> Result<()> {
     }
 }
 
-/// The names of a table's keys, and of the tables in it; for an empty name, those of the file itself.
-fn known(keys: &[Key], table: &str) -> Vec<&'static str> {
+/// The names of a table's keys, and of the tables in it; an empty name stands for the file itself.
+fn known_names(keys: &[Key], table: &str) -> Vec<&'static str> {
     let own = keys.iter().filter(|key| key.table == table).map(|key| key.name);
     own.chain(inner_tables(keys, table)).collect()
 }

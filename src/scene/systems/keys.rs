@@ -10,8 +10,7 @@ use crate::scene::snow;
 use crate::scene::surface;
 use std::sync::LazyLock;
 
-/// The keys of a system's scenes, in the order of a scene: the system's keys between the shot and the objects, and its own keys of objects
-/// after the shared ones.
+/// The keys of a system's scenes, in the order of a scene: the shot, the system, the objects (shared keys first), the output.
 pub fn of(system: System) -> &'static [Key] {
     static SNOW: LazyLock<Vec<Key>> = LazyLock::new(|| {
         let own = [snow::KEYS, snow::GRAIN_KEYS, snow::MIST_KEYS, snow::OUTPUT_KEYS];

@@ -16,7 +16,7 @@ mod tests {
     use crate::scene::run::settings::settings_of;
     use crate::scene::schema::Value;
     use crate::scene::schema::declaration::{Key, Kind, Scope, key, or};
-    use crate::scene::schema::values::path;
+    use crate::scene::schema::values::key_path;
     use crate::scene::schema::{reference_of, template_of};
     use std::path::Path;
 
@@ -86,10 +86,10 @@ mod tests {
             .map(|line| format!("{line}\n"))
             .collect();
         let scene = read(&text, keys::of(System::Snow)).unwrap();
-        let written: Vec<String> = scene.values.iter().map(|(key, object, _)| path(key, object)).collect();
+        let written: Vec<String> = scene.values.iter().map(|(key, index, _)| key_path(key, index)).collect();
         let all: Vec<String> = keys::of(System::Snow)
             .iter()
-            .map(|key| path(key, None).replace("object.", "object[1]."))
+            .map(|key| key_path(key, None).replace("object.", "object[1]."))
             .collect();
         let missing: Vec<&String> = all.iter().filter(|path| !written.contains(path)).collect();
         assert_eq!(missing, ["snow.top"]);

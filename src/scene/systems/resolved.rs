@@ -1,10 +1,10 @@
-//! Writes a scene with every default filled in and commented: the file next to the output that reproduces it.
+//! Writes a scene with every default filled in and commented: the file in the output folder that reproduces the output.
 
 use crate::scene::Scene;
 use crate::scene::schema::declaration::{Key, heading, is_table_array};
 use crate::scene::schema::documentation::line;
 use crate::scene::schema::shared_keys::tables;
-use crate::scene::schema::values::{Value, pose};
+use crate::scene::schema::values::{Value, pose_toml};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -27,28 +27,28 @@ impl Scene {
         out
     }
 
-    /// The same for a file in `folder`. If that lies in the scene's own folder, paths in the scene's folder are written relative to it, so
-    /// that the whole can be moved; if it is a sibling of the scene's folder, so are paths in their common parent. All other paths are
-    /// absolute.
+    /// The same for a file in `folder`, with relative paths where the whole may be moved: if `folder` lies in the scene's own folder, to files
+    /// in the scene's folder; if it is a sibling of the scene's folder, also to files in their common parent. All other paths are absolute.
     pub fn to_toml_in(&self, folder: &Path) -> String {
         let mut scene = self.clone();
         let home = self.path.parent().filter(|home| !home.as_os_str().is_empty()).unwrap_or(Path::new("."));
         // Links are resolved: `..` goes up from a folder's real position.
         if let (Ok(home), Ok(folder)) = (home.canonicalize(), folder.canonicalize()) {
-            let around =
-                home.parent().filter(|around| folder.parent() == Some(around) && *around != Path::new("/"));
-            let homes: Vec<&Path> = std::iter::once(home.as_path()).chain(around).collect();
+            let parent =
+                home.parent().filter(|parent| folder.parent() == Some(parent) && *parent != Path::new("/"));
+            let homes: Vec<&Path> = std::iter::once(home.as_path()).chain(parent).collect();
             for path in scene.values.paths_mut() {
-                let near = homes.iter().find_map(|home| relative(path, &folder, home));
-                *path = near.unwrap_or_else(|| path.clone());
+                if let Some(relative) = homes.iter().find_map(|home| relative(path, &folder, home)) {
+                    *path = relative;
+                }
             }
         }
         scene.to_toml()
     }
 
     /// A table with its values, if it has any.
-    fn write_table(&self, out: &mut String, table: &str, object: Option<usize>) {
-        let own = self.values.iter().filter(|(key, of, _)| key.table == table && *of == object);
+    fn write_table(&self, out: &mut String, table: &str, index: Option<usize>) {
+        let own = self.values.iter().filter(|(key, of, _)| key.table == table && *of == index);
         let values: Vec<(&Key, &Value)> = own.map(|(key, _, value)| (key, value)).collect();
         if !values.is_empty() {
             let _ = writeln!(out, "\n{}", heading(table));
@@ -61,7 +61,7 @@ impl Scene {
 fn lines(key: &Key, value: &Value) -> String {
     match value {
         Value::Poses(poses) if !poses.is_empty() => {
-            let poses: String = poses.iter().map(|key| format!("    {},\n", pose(key))).collect();
+            let poses: String = poses.iter().map(|key| format!("    {},\n", pose_toml(key))).collect();
             format!("{}{poses}]\n", line(&format!("{} = [", key.name), key.meaning))
         }
         value => line(&format!("{} = {value}", key.name), key.meaning),

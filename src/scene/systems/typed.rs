@@ -16,7 +16,7 @@ impl Shot {
 impl Object {
     /// The objects of a scene, in the file's order.
     pub(in crate::scene) fn all_of(values: &Values) -> Vec<Self> {
-        (0..values.count(OBJECT)).map(|index| Self::of(values.one(OBJECT, index))).collect()
+        (0..values.count(OBJECT)).map(|index| Self::of(values.element(OBJECT, index))).collect()
     }
 
     fn of(values: TableValues) -> Self {
@@ -37,7 +37,7 @@ impl Object {
 
 impl Output {
     pub(in crate::scene) fn of(values: &Values) -> Self {
-        // A system declares only the keys of files that it has.
+        // A system declares only the keys of its own files.
         let output = values.table("output");
         let is_on = |name: &str| output.find(name) == Some(true);
         let is_delta = |name: &str| output.text(name) == Some("delta");

@@ -1,11 +1,11 @@
-//! Positions on a terrain that sources, drains and absorbers move with.
+//! Positions attached to the triangles of a terrain, with which sources, drains and absorbers move.
 
 use crate::context::Context;
 use crate::geometry::check::deviation::{Nearest, NearestTree};
 use crate::geometry::{DVec3, TriMesh};
 use crate::scene::shallow::Shallow;
 
-/// A triangle is degenerate if its height is at most this fraction of its longest edge.
+/// A triangle is degenerate if its height over the longest edge is at most this fraction of that edge.
 const NEEDLE: f64 = 1e-10;
 
 /// A position on a triangle.
@@ -30,18 +30,18 @@ impl Attached {
     }
 }
 
-/// Attaches the points of a scene that follow the terrain to the nearest position on its mesh at the first frame; one entry for each point.
+/// For each flow point of a scene that follows the terrain, the nearest position on the terrain's mesh at the first frame.
 pub(in crate::scene::shallow) fn attach(
     ctx: &Context,
-    of: &Shallow,
+    setup: &Shallow,
     mesh: &TriMesh,
 ) -> Vec<Option<Attached>> {
-    if of.points.iter().all(|point| !point.follows) {
-        return vec![None; of.points.len()];
+    if setup.points.iter().all(|point| !point.follows) {
+        return vec![None; setup.points.len()];
     }
     let tree = ctx.pool().install(|| NearestTree::new(mesh));
     let attach = |at: [f64; 3]| tree.nearest(at.into()).map(|nearest| Attached::of(&nearest, mesh));
-    of.points.iter().map(|point| attach(point.point.at).filter(|_| point.follows)).collect()
+    setup.points.iter().map(|point| attach(point.point.at).filter(|_| point.follows)).collect()
 }
 
 fn corners(mesh: &TriMesh, triangle: usize) -> [DVec3; 3] {
@@ -57,10 +57,10 @@ fn shares(corners: [DVec3; 3], position: DVec3) -> [f64; 3] {
     let lengths = edges.map(|edge| edge.norm_squared());
     let longest = lengths.into_iter().fold(0.0, f64::max);
     if square <= NEEDLE * NEEDLE * longest * longest {
-        // A needle is treated as its longest edge, and a point as its own corner.
+        // A degenerate triangle is treated as its longest edge, or as its first corner if all of them coincide.
         let from = lengths.iter().position(|length| *length == longest).unwrap_or(0);
-        let way = (position - corners[from]).dot(&edges[from]);
-        let share = if longest > 0.0 { (way / longest).clamp(0.0, 1.0) } else { 0.0 };
+        let along = (position - corners[from]).dot(&edges[from]);
+        let share = if longest > 0.0 { (along / longest).clamp(0.0, 1.0) } else { 0.0 };
         let mut shares = [0.0; 3];
         (shares[from], shares[(from + 1) % 3]) = (1.0 - share, share);
         return shares;
@@ -86,7 +86,7 @@ mod tests {
         let flat =
             vec![corner(0.0, 0.0, 0.0), corner(0.0, 0.0, 2.0), corner(2.0, 0.0, 2.0), corner(2.0, 0.0, 0.0)];
         let mesh = TriMesh { positions: flat, triangles };
-        // Linear in the corners, so that positions on it move with the corners.
+        // An affine map of the plane, which keeps barycentric weights.
         let bend = |position: DVec3| {
             let [x, _, z]: [f64; 3] = position.into();
             DVec3::new(3.0 + 0.5 * x, 0.25 * x - z, z + 0.5 * x)

@@ -7,7 +7,7 @@ use crate::io::mesh::{EXTENSIONS, extension};
 use crate::scene::Frames;
 use crate::scene::schema::declaration::OBJECT;
 use crate::scene::schema::{Table, Value, Values};
-use crate::scene::shallow::{Form, Obstacle, Shallow};
+use crate::scene::shallow::{Obstacle, ObstacleShape, Shallow};
 
 impl Shallow {
     /// Checks the keys of `[shallow]` in combination.
@@ -62,13 +62,13 @@ impl Shallow {
         if shallow.params.liquid.thinning.is_some() && shallow.look != "blood" {
             return Err(table.error("thinning", "is of blood only: leave it out"));
         }
-        // All others are limited by their ranges.
+        // The ranges of the keys imply all other conditions.
         shallow.params.validate().map_err(|_| {
             table.error("gravity", "must point down by 0.001 to 1000 m/s2, and lean by 45 degrees at most")
         })
     }
 
-    /// Checks the keys of a table that may occur many times in combination.
+    /// Checks the keys of an element of an array of tables in combination.
     ///
     /// # Errors
     /// As [`Shallow::check`].
@@ -78,12 +78,12 @@ impl Shallow {
         table: &Table,
         values: &Values,
     ) -> Result<()> {
-        let own = values.one(name, index);
+        let own = values.element(name, index);
         match name {
             "object" => check_object(index, table, values),
             "scalar" => scalars::check(index, table, values),
             "pour" => {
-                scalars::check_brought(name, index, table, values)?;
+                scalars::check_concentrations(name, index, table, values)?;
                 let first = values.table("shot").get::<Frames>("frames").first;
                 if own.find::<i32>("frame").is_some_and(|frame| frame < first) {
                     let what = format!("must not lie before the shot's first frame, {first}");
@@ -92,7 +92,7 @@ impl Shallow {
                 Ok(())
             }
             _ => {
-                scalars::check_brought(name, index, table, values)?;
+                scalars::check_concentrations(name, index, table, values)?;
                 let terrain = values.get("shallow.terrain").and_then(Value::path);
                 if own.get("follows") && terrain.and_then(Pattern::parse).is_none() {
                     let what = "must be false where the terrain does not move: it needs a sequence of meshes, as \"organ.%04d.ply\"";
@@ -110,14 +110,14 @@ impl Shallow {
 }
 
 fn check_object(index: usize, table: &Table, values: &Values) -> Result<()> {
-    let own = values.one(OBJECT, index);
-    let shape = own.text("shape");
-    match (shape, own.value("file")) {
+    let own = values.element(OBJECT, index);
+    let named = own.text("shape");
+    match (named, own.value("file")) {
         (None, None) => return Err(table.error("shape", "is missing (or `file`, a mesh)")),
         (Some(_), Some(_)) => return Err(table.error("file", "excludes `shape`: give one of them")),
         _ => {}
     }
-    let needed: &[&str] = match shape {
+    let needed: &[&str] = match named {
         Some("sphere") => &["radius"],
         Some("capsule") => &["radius", "length"],
         Some(_) => &["size"],
@@ -126,27 +126,27 @@ fn check_object(index: usize, table: &Table, values: &Values) -> Result<()> {
     for name in ["radius", "length", "size"] {
         match (needed.contains(&name), own.value(name)) {
             (true, None) => {
-                return Err(table.error(name, format!("is missing: a {} has one", shape.unwrap_or(""))));
+                return Err(table.error(name, format!("is missing: a {} has one", named.unwrap_or(""))));
             }
             (false, Some(_)) => {
-                let of = shape.unwrap_or("mesh");
-                return Err(table.error(name, format!("is not of a {of}: leave it out")));
+                let shape = named.unwrap_or("mesh");
+                return Err(table.error(name, format!("is not of a {shape}: leave it out")));
             }
             _ => {}
         }
     }
     let Some(obstacle) = Obstacle::of(values, index) else { return Ok(()) };
-    match &obstacle.form {
-        Form::Sphere(radius) | Form::Capsule(radius, _) if *radius <= 0.0 => {
+    match &obstacle.shape {
+        ObstacleShape::Sphere(radius) | ObstacleShape::Capsule(radius, _) if *radius <= 0.0 => {
             Err(table.error("radius", "must be over 0 m"))
         }
-        Form::Cuboid(size) if size.iter().any(|length| *length <= 0.0) => {
+        ObstacleShape::Cuboid(size) if size.iter().any(|length| *length <= 0.0) => {
             Err(table.error("size", "must be three lengths over 0 m"))
         }
-        Form::Mesh(..) if obstacle.keys.len() > 1 => {
+        ObstacleShape::Mesh(..) if obstacle.keys.len() > 1 => {
             Err(table.error("keys", "of a file are one at most: a mesh does not move (a shape does)"))
         }
-        Form::Mesh(path, _) if Pattern::parse(path).is_some() => Err(table
+        ObstacleShape::Mesh(path, _) if Pattern::parse(path).is_some() => Err(table
             .error("file", "must be one file: a mesh does not move (a shape does, and so does the terrain)")),
         _ => Ok(()),
     }

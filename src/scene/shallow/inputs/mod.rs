@@ -1,4 +1,4 @@
-//! Everything that a scene with `[shallow]` reads before its first frame.
+//! All that a scene with `[shallow]` reads before its first frame.
 
 mod attached;
 mod consistency;
@@ -12,7 +12,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::estimate;
-use super::{Point, Shallow};
+use super::{Shallow, TimedFlowPoint};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::check::orientation::Orientation;
@@ -27,13 +27,13 @@ use crate::shallow::terrain::{Solids, triangles};
 use attached::{Attached, attach};
 use terrain::{Terrain, read_mesh};
 
-/// Space above the terrain by default: share of the terrain's height, and the minimum (m).
-const ROOM: (f64, f64) = (0.25, 0.1);
+/// Default margin above the terrain: share of the terrain's height, and the minimum (m).
+const MARGIN: (f64, f64) = (0.25, 0.1);
 /// A terrain wider than this (m) is probably in millimetres or centimetres.
-const WIDE: f64 = 20.0;
+const MAX_LIKELY_WIDTH: f64 = 20.0;
 
-/// The warning about a mesh (m) that 32-bit numbers round too much.
-fn too_far(path: &Path, mesh: &TriMesh, cell: f64) -> Option<String> {
+/// The warning about a mesh (m) so far from the origin that 32-bit numbers round it too much.
+fn rounding_warning(path: &Path, mesh: &TriMesh, cell: f64) -> Option<String> {
     mesh::too_far(&path.display().to_string(), mesh.farthest(), 1.0, cell, mesh::BY_KEY)
 }
 
@@ -52,14 +52,14 @@ pub struct Inputs {
     /// The meshes that stand on it (m).
     pub(super) meshes: Vec<TriMesh>,
     /// The terrain at the first frame, if it is a mesh that moves.
-    pub(super) moving: Option<TriMesh>,
+    pub(super) moving_terrain: Option<TriMesh>,
     /// The terrain, if it is a mesh that does not move and minimum heights, skirts or stains are wanted.
-    pub(super) still: Option<TriMesh>,
-    /// For each of the scene's points, its position on the terrain if it follows that.
+    pub(super) still_terrain: Option<TriMesh>,
+    /// For each flow point of the scene, the position on the terrain that it follows, if it follows any.
     pub(super) attached: Vec<Option<Attached>>,
-    /// Which of the terrain's triangles are flipped.
+    /// Which of the terrain's triangles are flipped, at every frame.
     pub(super) orientation: Orientation,
-    /// Whether all of them are flipped after that, as they face down.
+    /// Whether all triangles are then flipped, as they face down.
     pub(super) is_turned: bool,
     /// Contents of the files when they were read.
     pub(in crate::scene) input_hashes: Arc<InputHashes>,
@@ -88,9 +88,9 @@ impl Inputs {
         let bounds = terrain.bounds();
         let grid = grid(shallow, &bounds).map_err(|error| error.in_file(&scene.path))?;
         let heights = heights(shallow, &bounds).map_err(|error| error.in_file(&scene.path))?;
-        let mut warnings: Vec<String> = wide(shallow, &path, &bounds).into_iter().collect();
+        let mut warnings: Vec<String> = unit_warning(shallow, &path, &bounds).into_iter().collect();
         if let Terrain::Mesh(mesh) = &terrain {
-            warnings.extend(too_far(&path, mesh, grid.cell));
+            warnings.extend(rounding_warning(&path, mesh, grid.cell));
         }
         // A terrain in millimetres by mistake has too many cells.
         estimate::allow_cells(ctx, &grid)
@@ -108,11 +108,13 @@ impl Inputs {
             _ => None,
         };
         let triangles = mesh.as_ref().map(|mesh| mesh.triangles.len());
-        let (moving, still) = if shallow.sequence().is_some() { (mesh, None) } else { (None, mesh) };
-        let still = still.filter(|_| shallow.lifts || shallow.skirts || shallow.staining.is_some());
-        let attached = moving.as_ref().map(|mesh| attach(ctx, shallow, mesh)).unwrap_or_default();
-        if let Some(mesh) = &moving {
-            warnings.extend(beside(scene, shallow, mesh, &attached));
+        let (moving_terrain, still_terrain) =
+            if shallow.sequence().is_some() { (mesh, None) } else { (None, mesh) };
+        let still_terrain =
+            still_terrain.filter(|_| shallow.minimum_heights || shallow.skirts || shallow.staining.is_some());
+        let attached = moving_terrain.as_ref().map(|mesh| attach(ctx, shallow, mesh)).unwrap_or_default();
+        if let Some(mesh) = &moving_terrain {
+            warnings.extend(attachment_warnings(scene, shallow, mesh, &attached));
         }
         let inputs = Self {
             grid,
@@ -121,8 +123,8 @@ impl Inputs {
             triangles,
             solids,
             meshes,
-            moving,
-            still,
+            moving_terrain,
+            still_terrain,
             attached,
             orientation,
             is_turned,
@@ -180,7 +182,7 @@ impl Inputs {
     }
 }
 
-/// The solids of a terrain, and whether that is a mesh of triangles that face down, which is then reversed.
+/// The solids of a terrain, and whether it was reversed: a mesh of which no triangle faces up.
 ///
 /// # Errors
 /// A terrain without a surface that faces up; cancel.
@@ -228,7 +230,7 @@ fn add_meshes(
         warnings.extend(orientation.warning().map(|what| format!("{}: {what}", own.display())));
         let on_it = triangles::solids(&mesh.positions, &mesh.triangles, solids.grid, solids.heights);
         let on_it = on_it.map_err(|error| error.in_file(own))?;
-        warnings.extend(too_far(own, mesh, solids.grid.cell));
+        warnings.extend(rounding_warning(own, mesh, solids.grid.cell));
         if orientation.has_open() && orientation.warning().is_none() {
             let what = "is not closed: below a surface of it that faces up all is solid";
             warnings.push(format!("{}: {what}", own.display()));
@@ -238,13 +240,13 @@ fn add_meshes(
     Ok(meshes)
 }
 
-/// The union of both.
+/// The union of two sets of solids.
 pub(super) fn united(a: &Solids, b: &Solids) -> Solids {
     let of_cell = |cell: usize| a.cell(cell).iter().chain(b.cell(cell)).copied().collect();
     Solids::new(a.grid, a.heights, (0..a.grid.cells()).map(of_cell))
 }
 
-/// The cells: the number that fits the area best, centred in it.
+/// The cells: the area's size in whole cells, centred in it.
 fn grid(shallow: &Shallow, bounds: &[DVec3; 2]) -> Result<Grid> {
     let [low, high] = bounds;
     let [x0, z0, x1, z1] = shallow.area.unwrap_or([low.x, low.z, high.x, high.z]);
@@ -273,10 +275,10 @@ pub(super) fn area(grid: &Grid) -> [f64; 4] {
 /// The heights of ground and liquid.
 fn heights(shallow: &Shallow, bounds: &[DVec3; 2]) -> Result<Heights> {
     let [low, high] = bounds.each_ref().map(|corner| corner.y);
-    let room = (ROOM.0 * (high - low)).max(ROOM.1);
-    let below = if shallow.sequence().is_some() { low - room } else { low };
+    let margin = (MARGIN.0 * (high - low)).max(MARGIN.1);
+    let below = if shallow.sequence().is_some() { low - margin } else { low };
     let bottom = shallow.bottom.unwrap_or(below);
-    let top = shallow.top.unwrap_or(high.max(shallow.fill.unwrap_or(high)) + room);
+    let top = shallow.top.unwrap_or(high.max(shallow.fill.unwrap_or(high)) + margin);
     if top <= bottom {
         return Err(Error::argument(format!(
             "the heights of ground and liquid go from {bottom} m up to {top} m: give shallow.bottom and shallow.top"
@@ -285,9 +287,14 @@ fn heights(shallow: &Shallow, bounds: &[DVec3; 2]) -> Result<Heights> {
     Heights::between(bottom, top)
 }
 
-/// The warning about points that follow a position to the side of their own, as for points given high above a slope.
-fn beside(scene: &Scene, shallow: &Shallow, mesh: &TriMesh, attached: &[Option<Attached>]) -> Vec<String> {
-    let warning = |(point, attached): (&Point, &Option<Attached>)| {
+/// Warnings about points that are attached to a position to one side of them, as if given high above a slope.
+fn attachment_warnings(
+    scene: &Scene,
+    shallow: &Shallow,
+    mesh: &TriMesh,
+    attached: &[Option<Attached>],
+) -> Vec<String> {
+    let warning = |(point, attached): (&TimedFlowPoint, &Option<Attached>)| {
         let [x, y, z] = attached.as_ref()?.position(mesh);
         let [own_x, _, own_z] = point.point.at;
         let off = ((x - own_x).powi(2) + (z - own_z).powi(2)).sqrt();
@@ -302,11 +309,11 @@ fn beside(scene: &Scene, shallow: &Shallow, mesh: &TriMesh, attached: &[Option<A
     shallow.points.iter().zip(attached).filter_map(warning).collect()
 }
 
-/// The warning about a terrain that is probably in another unit.
-fn wide(shallow: &Shallow, path: &Path, [low, high]: &[DVec3; 2]) -> Option<String> {
+/// The warning about a mesh that is probably in another unit.
+fn unit_warning(shallow: &Shallow, path: &Path, [low, high]: &[DVec3; 2]) -> Option<String> {
     let size = high - low;
     let is_mesh = shallow.image.is_none() && shallow.space.scale == Space::OWN.scale;
-    (is_mesh && size.x.max(size.z) > WIDE).then(|| {
+    (is_mesh && size.x.max(size.z) > MAX_LIKELY_WIDTH).then(|| {
         format!(
             "{}: the terrain is {:.1} x {:.1} x {:.1} m (x, y, z): shallow.scale = 0.001 takes millimetres, 0.01 centimetres",
             path.display(),

@@ -7,7 +7,7 @@ use crate::geometry::{DVec3, TriMesh, Vec3};
 use crate::io::records::input_hashes::InputHashes;
 use crate::motion::{Key, Keys};
 use crate::scene::KeyPose;
-use crate::scene::shallow::{Form, Obstacle, Shallow};
+use crate::scene::shallow::{Obstacle, ObstacleShape, Shallow};
 use crate::shallow::terrain::shapes::Shape;
 
 use super::terrain::read_mesh;
@@ -27,26 +27,26 @@ impl Obstacle {
     /// Its shape at a frame; `None` for a mesh.
     fn shape(&self, frame: i32) -> Result<Option<Shape>> {
         let (turn, at) = self.pose(frame)?;
-        Ok(match self.form {
-            Form::Sphere(radius) => Some(Shape::Sphere { centre: at, radius }),
-            Form::Capsule(radius, length) => {
+        Ok(match self.shape {
+            ObstacleShape::Sphere(radius) => Some(Shape::Sphere { centre: at, radius }),
+            ObstacleShape::Capsule(radius, length) => {
                 let half = turn * DVec3::new(0.0, 0.5 * length, 0.0);
                 Some(Shape::Capsule { ends: [at - half, at + half], radius })
             }
-            Form::Cuboid(size) => {
+            ObstacleShape::Cuboid(size) => {
                 let axes = [DVec3::x(), DVec3::y(), DVec3::z()].map(|axis| turn * axis);
                 Some(Shape::Cuboid { centre: at, axes, half: size.map(|length| 0.5 * length) })
             }
-            Form::Mesh(..) => None,
+            ObstacleShape::Mesh(..) => None,
         })
     }
 
-    /// Its mesh as it stands on the terrain from the first frame on (m); `None` for a shape.
+    /// Its mesh in its pose at the first frame, which it keeps (m); `None` for a shape.
     ///
     /// # Errors
     /// A file that cannot be read.
     fn mesh(&self, first: i32, input_hashes: &InputHashes) -> Result<Option<TriMesh>> {
-        let Form::Mesh(path, space) = &self.form else { return Ok(None) };
+        let ObstacleShape::Mesh(path, space) = &self.shape else { return Ok(None) };
         let mut mesh = read_mesh(path, *space, input_hashes)?;
         let (turn, at) = self.pose(first)?;
         mesh.positions
@@ -64,7 +64,7 @@ pub(in crate::scene::shallow) fn shapes_at(shallow: &Shallow, frame: i32) -> Res
     shallow.obstacles.iter().filter_map(|obstacle| obstacle.shape(frame).transpose()).collect()
 }
 
-/// The meshes that stand on the terrain, one each, in the file's order (m).
+/// The obstacles that are meshes, in the file's order (m).
 ///
 /// # Errors
 /// A file that cannot be read.
@@ -76,15 +76,15 @@ pub(in crate::scene::shallow) fn meshes(
     shallow.obstacles.iter().filter_map(|obstacle| obstacle.mesh(first, input_hashes).transpose()).collect()
 }
 
-/// Points around a drawn sphere, and rings from its bottom to its middle.
-const AROUND: usize = 32;
+/// Points of each ring of a sphere's mesh, and rings from its bottom to its middle.
+const RING_POINTS: usize = 32;
 const RINGS: usize = 8;
 
 /// A shape as triangles, for rendering.
-pub(in crate::scene::shallow) fn drawn(shape: &Shape) -> TriMesh {
+pub(in crate::scene::shallow) fn shape_mesh(shape: &Shape) -> TriMesh {
     match shape {
-        Shape::Sphere { centre, radius } => pill([*centre; 2], *radius),
-        Shape::Capsule { ends, radius } => pill(*ends, *radius),
+        Shape::Sphere { centre, radius } => capsule_mesh([*centre; 2], *radius),
+        Shape::Capsule { ends, radius } => capsule_mesh(*ends, *radius),
         Shape::Cuboid { centre, axes, half } => {
             let mut mesh = TriMesh::cuboid([-1.0; 3], [1.0; 3]);
             for position in &mut mesh.positions {
@@ -98,7 +98,7 @@ pub(in crate::scene::shallow) fn drawn(shape: &Shape) -> TriMesh {
 }
 
 /// A capsule: two hemispheres, and the cylinder between.
-fn pill([from, to]: [DVec3; 2], radius: f64) -> TriMesh {
+fn capsule_mesh([from, to]: [DVec3; 2], radius: f64) -> TriMesh {
     let up = (to - from).try_normalize(0.0).unwrap_or_else(DVec3::y);
     let helper = if up.x.abs() < 0.7 { DVec3::x() } else { DVec3::z() };
     let side = helper.cross(&up).normalize();
@@ -109,16 +109,16 @@ fn pill([from, to]: [DVec3; 2], radius: f64) -> TriMesh {
         // The middle ring occurs twice: at both ends.
         let tilt = (ring - end) as f64 / (2 * RINGS - 2) as f64 * std::f64::consts::PI;
         let (wide, high) = (radius * libm::sin(tilt), -radius * libm::cos(tilt));
-        for point in 0..AROUND {
-            let angle = point as f64 / AROUND as f64 * std::f64::consts::TAU;
+        for point in 0..RING_POINTS {
+            let angle = point as f64 / RING_POINTS as f64 * std::f64::consts::TAU;
             let off = side * (wide * libm::cos(angle)) + other * (wide * libm::sin(angle)) + up * high;
             positions.push(([from, to][end] + off).cast());
         }
     }
     let mut triangles = Vec::new();
     for ring in 0..2 * RINGS - 1 {
-        for point in 0..AROUND {
-            let at = |ring: usize, point: usize| (ring * AROUND + point % AROUND) as u32;
+        for point in 0..RING_POINTS {
+            let at = |ring: usize, point: usize| (ring * RING_POINTS + point % RING_POINTS) as u32;
             let [a, b, c, d] =
                 [at(ring, point), at(ring + 1, point), at(ring + 1, point + 1), at(ring, point + 1)];
             triangles.extend([[a, c, b], [a, d, c]]);
@@ -132,16 +132,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_drawn_pill_is_as_large_as_its_shape() {
+    fn the_mesh_of_a_shape_is_as_large_as_the_shape() {
         let ends = [DVec3::new(1.0, 2.0, 3.0), DVec3::new(1.0, 2.0, 5.0)];
-        let mesh = drawn(&Shape::Capsule { ends, radius: 0.5 });
+        let mesh = shape_mesh(&Shape::Capsule { ends, radius: 0.5 });
         let whole = std::f64::consts::PI * (0.25 * 2.0 + 4.0 / 3.0 * 0.125);
         assert!((mesh.volume() / whole - 1.0).abs() < 0.03, "{} is not {whole}", mesh.volume());
-        let ball = drawn(&Shape::Sphere { centre: ends[0], radius: 1.0 });
+        let ball = shape_mesh(&Shape::Sphere { centre: ends[0], radius: 1.0 });
         assert!((ball.volume() / (4.0 / 3.0 * std::f64::consts::PI) - 1.0).abs() < 0.03, "{}", ball.volume());
         let half = [1.0, 2.0, 0.5];
         let turned = [DVec3::y(), -DVec3::x(), DVec3::z()];
-        let cuboid = drawn(&Shape::Cuboid { centre: ends[0], axes: turned, half });
+        let cuboid = shape_mesh(&Shape::Cuboid { centre: ends[0], axes: turned, half });
         assert!((cuboid.volume() - 8.0).abs() < 1e-6, "{}", cuboid.volume());
     }
 
@@ -149,7 +149,7 @@ mod tests {
     fn shapes_go_along_their_keys() {
         let key = |frame, at, turn_deg| KeyPose { frame, at, turn_deg };
         let keys = vec![key(1.0, [0.0; 3], [0.0; 3]), key(3.0, [2.0, 0.0, 0.0], [0.0, 0.0, 180.0])];
-        let obstacle = Obstacle { form: Form::Capsule(0.1, 2.0), keys, ease: false };
+        let obstacle = Obstacle { shape: ObstacleShape::Capsule(0.1, 2.0), keys, ease: false };
         let Some(Shape::Capsule { ends, .. }) = obstacle.shape(2).unwrap() else { panic!() };
         assert!((ends[0] - DVec3::new(2.0, 0.0, 0.0)).norm() < 1e-12, "{ends:?}");
         assert!((ends[1] - DVec3::new(0.0, 0.0, 0.0)).norm() < 1e-12, "{ends:?}");

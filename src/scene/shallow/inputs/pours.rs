@@ -11,12 +11,13 @@ use crate::shallow::{self, columns::Columns};
 /// A pour above nothing but solid, outside the area, or that does not fit, with its name.
 pub(in crate::scene::shallow) fn pour(
     scene: &Scene,
-    of: &Shallow,
+    setup: &Shallow,
     liquid: &mut shallow::Shallow,
     frame: i32,
 ) -> Result<()> {
     let first = scene.shot.frames.first;
-    for (index, pour) in of.pours.iter().enumerate().filter(|(_, pour)| pour.frame.unwrap_or(first) == frame)
+    for (index, pour) in
+        setup.pours.iter().enumerate().filter(|(_, pour)| pour.frame.unwrap_or(first) == frame)
     {
         let refused = |what: String| Error::file(&scene.path, format!("pour.{}: {what}", index + 1));
         let columns = pour.columns(liquid.columns());
@@ -27,14 +28,14 @@ pub(in crate::scene::shallow) fn pour(
             )));
         }
         liquid.set_poured(&pour.carries)?;
-        let lacking = pour.volume - spread(liquid, &columns, pour.volume);
-        // Rounding of depths leaves less than that.
+        let missing = pour.volume - spread(liquid, &columns, pour.volume);
+        // Rounding of depths leaves less than a unit in each column.
         let (cell, unit) = (liquid.columns().grid.cell, liquid.columns().heights.unit);
-        if lacking > 1e-6 * pour.volume + columns.len() as f64 * unit * cell * cell {
+        if missing > 1e-6 * pour.volume + columns.len() as f64 * unit * cell * cell {
             let what = format!(
                 "{} ml do not fit into its circle: {:.6} ml are left (a greater radius or shallow.top)",
                 pour.volume / ML,
-                lacking / ML
+                missing / ML
             );
             return Err(refused(what));
         }
@@ -42,21 +43,21 @@ pub(in crate::scene::shallow) fn pour(
     Ok(())
 }
 
-/// Adds a volume (m3) to columns, an equal depth to each as far as it fits; returns the added volume.
+/// Adds a volume (m3) to columns, in equal depths as far as each has room; returns the added volume.
 fn spread(liquid: &mut shallow::Shallow, columns: &[usize], volume: f64) -> f64 {
     let cell = liquid.columns().grid.cell;
-    let least = liquid.columns().heights.unit;
+    let unit = liquid.columns().heights.unit;
     let (mut open, mut left) = (columns.to_vec(), volume / (cell * cell));
     while !open.is_empty() {
         let each = left / open.len() as f64;
-        if each < least {
+        if each < unit {
             break;
         }
         let mut full = 0;
         open.retain(|&column| {
             let added = liquid.pour(column, each);
             left -= added;
-            let takes_all = added > each - least;
+            let takes_all = added > each - unit;
             full += usize::from(!takes_all);
             takes_all
         });

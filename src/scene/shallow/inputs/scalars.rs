@@ -3,31 +3,31 @@
 use crate::error::Result;
 use crate::scene::Scene;
 use crate::scene::schema::{Table, Value, Values};
-use crate::scene::shallow::{ML, Point, Shallow};
+use crate::scene::shallow::{ML, Shallow, TimedFlowPoint};
 use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::{self, Law, Scalar, Thickening};
 
-/// Names of arrays that the surface already has in some file format.
-const TAKEN: [&str; 13] =
+/// Names that arrays of the surface already have in some file format.
+const RESERVED_NAMES: [&str; 13] =
     ["x", "y", "z", "v", "vx", "vy", "vz", "depth", "layer", "alpha", "falling", "points", "velocities"];
 
 /// A scalar of a scene's liquid.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Carried {
+pub struct SceneScalar {
     /// Name, law and range.
     pub scalar: Scalar,
-    /// Concentration of liquid that does not specify it.
+    /// Concentration in liquid that does not specify one.
     pub start: f64,
 }
 
-impl Carried {
+impl SceneScalar {
     /// The scalars of a scene, in the file's order.
     pub(in crate::scene::shallow) fn all_of(values: &Values) -> Vec<Self> {
         (0..values.count("scalar")).map(|index| Self::of(values, index)).collect()
     }
 
     fn of(values: &Values, index: usize) -> Self {
-        let own = values.one("scalar", index);
+        let own = values.element("scalar", index);
         let law = match (own.text("law"), own.find("half_life")) {
             (Some("decays"), Some(half_life)) => Law::Decays(half_life),
             (Some("ages"), _) => Law::Ages,
@@ -38,36 +38,36 @@ impl Carried {
     }
 }
 
-/// How a scalar thickens the liquid: the first that does.
+/// How the first scalar that thickens the liquid does so.
 pub(in crate::scene::shallow) fn thickening(values: &Values) -> Option<Thickening> {
     (0..values.count("scalar")).find_map(|scalar| {
-        let own = values.one("scalar", scalar);
+        let own = values.element("scalar", scalar);
         let (times, to) = (own.find("thickens_times")?, own.find("thickens_to")?);
         Some(Thickening { scalar, from: own.get("thickens_from"), to, times })
     })
 }
 
-/// The scalar that stains: the first that does.
+/// Index of the first scalar that stains.
 pub(in crate::scene::shallow) fn staining(values: &Values) -> Option<usize> {
-    (0..values.count("scalar")).find(|index| values.one("scalar", *index).get("stains"))
+    (0..values.count("scalar")).find(|index| values.element("scalar", *index).get("stains"))
 }
 
-/// Concentrations of the scalars in the liquid of a pour or a source: those that its `carries` names, and the defaults of the others.
-pub(in crate::scene::shallow) fn brought(values: &Values, table: &str, index: usize) -> Vec<f64> {
-    let named = values.one(table, index).value("carries").and_then(Value::named);
-    let own = |carried: Carried| {
+/// Concentrations of all scalars in the liquid of a pour or a source: by its `carries`, or else the scalar's `start`.
+pub(in crate::scene::shallow) fn concentrations(values: &Values, table: &str, index: usize) -> Vec<f64> {
+    let named = values.element(table, index).value("carries").and_then(Value::named);
+    let own = |carried: SceneScalar| {
         named.and_then(|named| named.get(&carried.scalar.name)).copied().unwrap_or(carried.start)
     };
-    Carried::all_of(values).into_iter().map(own).collect()
+    SceneScalar::all_of(values).into_iter().map(own).collect()
 }
 
-/// Checks the keys of a `[[scalar]]` in combination; earlier ones have been read.
+/// Checks the keys of a `[[scalar]]` in combination; earlier scalars have been read.
 ///
 /// # Errors
 /// A name that no array can have, or that is taken; a key that its law does not have, or a missing one; one scalar too many.
 pub(in crate::scene::shallow) fn check(index: usize, table: &Table, values: &Values) -> Result<()> {
-    let all = Carried::all_of(values);
-    let Carried { scalar, start } = &all[index];
+    let all = SceneScalar::all_of(values);
+    let SceneScalar { scalar, start } = &all[index];
     let name = &*scalar.name;
     if index >= MAX_SCALARS {
         return Err(
@@ -82,7 +82,7 @@ pub(in crate::scene::shallow) fn check(index: usize, table: &Table, values: &Val
     if !is_word(name) {
         return Err(table.error("name", "must be of letters, digits and _, and begin with no digit"));
     }
-    if TAKEN.contains(&name) {
+    if RESERVED_NAMES.contains(&name) {
         return Err(
             table.error("name", format!("must not be \"{name}\": the surface has an array of that name"))
         );
@@ -90,7 +90,7 @@ pub(in crate::scene::shallow) fn check(index: usize, table: &Table, values: &Val
     if all[..index].iter().any(|other| other.scalar.name == scalar.name) {
         return Err(table.error("name", format!("must not be \"{name}\": another scalar has that name")));
     }
-    let own = values.one("scalar", index);
+    let own = values.element("scalar", index);
     match (own.text("law"), table.has("half_life")) {
         (Some("decays"), false) => {
             return Err(table.error("half_life", "is missing: a scalar that decays has one"));
@@ -114,12 +114,12 @@ pub(in crate::scene::shallow) fn check(index: usize, table: &Table, values: &Val
     check_thickening(index, table, values, scalar.range)
 }
 
-/// Checks how a scalar thickens the liquid; earlier ones have been read.
+/// Checks how a scalar thickens the liquid; earlier scalars have been read.
 ///
 /// # Errors
 /// A key without the others; a concentration out of range; a second scalar that thickens, or a liquid that cannot be thickened.
 fn check_thickening(index: usize, table: &Table, values: &Values, range: f64) -> Result<()> {
-    let own = values.one("scalar", index);
+    let own = values.element("scalar", index);
     if own.value("thickens_times").is_none() {
         return match table.has("thickens_to") {
             true => Err(table.error("thickens_to", "is of a scalar that has `thickens_times`: leave it out")),
@@ -151,16 +151,18 @@ fn check_thickening(index: usize, table: &Table, values: &Values, range: f64) ->
 ///
 /// # Errors
 /// A name that no scalar has; a concentration out of range.
-pub(in crate::scene::shallow) fn check_brought(
+pub(in crate::scene::shallow) fn check_concentrations(
     name: &str,
     index: usize,
     table: &Table,
     values: &Values,
 ) -> Result<()> {
-    let Some(named) = values.one(name, index).value("carries").and_then(Value::named) else { return Ok(()) };
-    let all = Carried::all_of(values);
+    let Some(named) = values.element(name, index).value("carries").and_then(Value::named) else {
+        return Ok(());
+    };
+    let all = SceneScalar::all_of(values);
     for (name, concentration) in named {
-        let Some(Carried { scalar, .. }) = all.iter().find(|carried| carried.scalar.name == *name) else {
+        let Some(SceneScalar { scalar, .. }) = all.iter().find(|carried| carried.scalar.name == *name) else {
             return Err(table.error("carries", format!("names `{name}`, which is the name of no [[scalar]]")));
         };
         if concentration.abs() > scalar.range {
@@ -179,7 +181,7 @@ impl Shallow {
     ///
     /// # Errors
     /// Errors of the library, with the scene's name.
-    pub(in crate::scene::shallow) fn carry(
+    pub(in crate::scene::shallow) fn set_scalars(
         &self,
         scene: &Scene,
         liquid: &mut shallow::Shallow,
@@ -195,8 +197,9 @@ impl Shallow {
     ///
     /// # Errors
     /// None for a scene that was read.
-    pub(in crate::scene::shallow) fn source_scalars(&self, liquid: &mut shallow::Shallow) -> Result<()> {
-        let is_source = |(_, point): &(usize, &Point)| point.name.0 == "source" && !point.carries.is_empty();
+    pub(in crate::scene::shallow) fn set_source_scalars(&self, liquid: &mut shallow::Shallow) -> Result<()> {
+        let is_source =
+            |(_, point): &(usize, &TimedFlowPoint)| point.name.0 == "source" && !point.carries.is_empty();
         let mut sources = self.points.iter().enumerate().filter(is_source);
         sources.try_for_each(|(index, point)| liquid.set_sourced(index, &point.carries))
     }
@@ -207,7 +210,27 @@ impl Shallow {
     }
 }
 
-/// Where each scalar is, by name: concentration x volume (its own unit x ml).
+/// The amounts that the balances of liquid and scalars share, as fields of a JSON object in ml.
+macro_rules! amounts_in_ml {
+    ($balance:expr) => {{
+        let balance = &$balance;
+        let amounts = [
+            ("inside_ml", balance.inside),
+            ("poured_ml", balance.poured),
+            ("sourced_ml", balance.sourced),
+            ("drained_ml", balance.drained),
+            ("absorbed_ml", balance.absorbed),
+            ("lost_ml", balance.lost),
+            ("gained_ml", balance.gained),
+            ("falling_ml", balance.falling),
+        ];
+        let fields = amounts.map(|(name, amount)| (name.to_string(), serde_json::Value::from(amount / ML)));
+        serde_json::Map::from_iter(fields)
+    }};
+}
+pub(in crate::scene::shallow) use amounts_in_ml;
+
+/// The balance of each scalar, by name: concentration x volume (the scalar's unit x ml).
 pub(in crate::scene::shallow) fn balances(
     liquid: &shallow::Shallow,
 ) -> Result<serde_json::Map<String, serde_json::Value>> {
@@ -215,22 +238,12 @@ pub(in crate::scene::shallow) fn balances(
     scalars
         .map(|(index, scalar)| {
             let balance = liquid.scalar_balance(index)?;
-            let ml = |amount: f64| amount / ML;
-            let balance = serde_json::json!({
-                "inside_ml": ml(balance.inside),
-                "poured_ml": ml(balance.poured),
-                "sourced_ml": ml(balance.sourced),
-                "drained_ml": ml(balance.drained),
-                "absorbed_ml": ml(balance.absorbed),
-                "lost_ml": ml(balance.lost),
-                "gained_ml": ml(balance.gained),
-                "held_ml": ml(balance.held),
-                "falling_ml": ml(balance.falling),
-                "grown_ml": ml(balance.grown),
-                "dried_ml": ml(balance.dried),
-                "missing": balance.error as f64,
-            });
-            Ok((scalar.name.clone(), balance))
+            let mut fields = amounts_in_ml!(balance);
+            fields.insert("held_ml".into(), (balance.held / ML).into());
+            fields.insert("grown_ml".into(), (balance.grown / ML).into());
+            fields.insert("dried_ml".into(), (balance.dried / ML).into());
+            fields.insert("missing".into(), (balance.error as f64).into());
+            Ok((scalar.name.clone(), fields.into()))
         })
         .collect()
 }

@@ -14,7 +14,7 @@ use crate::io::image;
 use crate::io::mesh::{extension, parse_polygons_from};
 use crate::io::records::input_hashes::InputHashes;
 use crate::motion::Space;
-use crate::scene::shallow::{ImagePlace, Shallow};
+use crate::scene::shallow::{ImagePlacement, Shallow};
 use crate::shallow::columns::grid::{Grid, Heights};
 use crate::shallow::terrain::facing::facing;
 #[cfg(feature = "cli")]
@@ -25,13 +25,13 @@ use crate::shallow::terrain::{Solids, triangles};
 #[cfg(feature = "vdb")]
 use crate::vdb::{FloatGrid, GridClass, file};
 
-/// What the liquid flows over (m).
+/// The terrain that the liquid flows over (m).
 pub(in crate::scene::shallow) enum Terrain {
     /// Triangles.
     Mesh(TriMesh),
     /// A greyscale image centred at the origin.
     #[cfg(feature = "cli")]
-    Image(image::Grey, ImagePlace),
+    Image(image::Grey, ImagePlacement),
     /// A level set.
     #[cfg(feature = "vdb")]
     Grid(FloatGrid),
@@ -46,12 +46,12 @@ impl Terrain {
         let path = shallow.terrain_at(frame);
         match (&*extension(&path), shallow.image) {
             ("vdb", _) => of_vdb(&path, input_hashes),
-            ("png", Some(position)) => of_image(&path, position, input_hashes),
+            ("png", Some(placement)) => of_image(&path, placement, input_hashes),
             _ => Ok(Self::Mesh(read_mesh(&path, shallow.space, input_hashes)?)),
         }
     }
 
-    /// Turns the closed parts of a mesh outward; returns the orientation.
+    /// Turns the closed parts of a mesh outward; returns which triangles were flipped.
     pub fn turn_outward(&mut self) -> Orientation {
         match self {
             Self::Mesh(mesh) => {
@@ -72,12 +72,12 @@ impl Terrain {
                 [low.cast(), high.cast()]
             }
             #[cfg(feature = "cli")]
-            Self::Image(image, position) => {
-                let [x, z] = position.size.map(|length| 0.5 * length);
+            Self::Image(image, placement) => {
+                let [x, z] = placement.size.map(|length| 0.5 * length);
                 let ends =
                     image.values.iter().fold([1.0f32, 0.0], |[low, high], v| [low.min(*v), high.max(*v)]);
                 let height = |grey: f32| {
-                    let [black, white] = position.heights;
+                    let [black, white] = placement.heights;
                     black + f64::from(grey) * (white - black)
                 };
                 [DVec3::new(-x, height(ends[0]), -z), DVec3::new(x, height(ends[1]), z)]
@@ -106,14 +106,14 @@ impl Terrain {
         match self {
             Self::Mesh(mesh) => triangles::solids(&mesh.positions, &mesh.triangles, grid, heights),
             #[cfg(feature = "cli")]
-            Self::Image(image, position) => {
-                let [x, z] = position.size;
+            Self::Image(image, placement) => {
+                let [x, z] = placement.size;
                 let image = height::Image {
                     greys: &image.values,
                     size: image.size,
                     corner: [-0.5 * x, -0.5 * z],
-                    extent: position.size,
-                    levels: position.heights,
+                    extent: placement.size,
+                    levels: placement.heights,
                 };
                 height::of_image(&image, grid, heights)
             }
@@ -137,15 +137,15 @@ impl Terrain {
         match self {
             Self::Mesh(mesh) => Ok(mesh),
             #[cfg(feature = "cli")]
-            Self::Image(image, position) => Ok(relief(&image, position)),
+            Self::Image(image, placement) => Ok(image_mesh(&image, placement)),
             #[cfg(feature = "vdb")]
             Self::Grid(grid) => crate::vdb::level_set::to_mesh(ctx, &grid, 0.0, 0.0),
         }
     }
 }
 
-/// A mesh (m, Y up); vertices that are one corner except for rounding ([`Weld`]) get one position: a column between two triangles that
-/// should share an edge would otherwise belong to neither.
+/// A mesh (m, Y up), in which vertices that differ only by rounding ([`Weld`]) get the same position: otherwise a column between two
+/// triangles that should share an edge would belong to neither.
 ///
 /// # Errors
 /// A file that cannot be read, or that has changed since it was read.
@@ -162,28 +162,28 @@ pub(in crate::scene::shallow) fn read_mesh(
         log::warn!("{}: {what}", path.display());
     }
     if !space.keeps_vectors() {
-        mesh.positions.iter_mut().for_each(|place| *place = space.vector(place.cast()).cast());
+        mesh.positions.iter_mut().for_each(|position| *position = space.vector(position.cast()).cast());
     }
     Ok(mesh)
 }
 
 #[cfg(feature = "cli")]
-fn of_image(path: &Path, position: ImagePlace, input_hashes: &InputHashes) -> Result<Terrain> {
-    Ok(Terrain::Image(image::parse(path, &input_hashes.read(path)?)?, position))
+fn of_image(path: &Path, placement: ImagePlacement, input_hashes: &InputHashes) -> Result<Terrain> {
+    Ok(Terrain::Image(image::parse(path, &input_hashes.read(path)?)?, placement))
 }
 
 #[cfg(not(feature = "cli"))]
-fn of_image(path: &Path, _position: ImagePlace, _seen: &InputHashes) -> Result<Terrain> {
+fn of_image(path: &Path, _placement: ImagePlacement, _input_hashes: &InputHashes) -> Result<Terrain> {
     Err(Error::file(path, "needs the feature cli, which this frazil was built without"))
 }
 
-/// A point for each pixel, at its centre.
+/// An image of heights as a mesh, with a vertex at the centre of each pixel.
 #[cfg(feature = "cli")]
-fn relief(image: &image::Grey, position: ImagePlace) -> TriMesh {
+fn image_mesh(image: &image::Grey, placement: ImagePlacement) -> TriMesh {
     let [across, down] = image.size;
-    let [black, white] = position.heights;
+    let [black, white] = placement.heights;
     let at = |axis: usize, index: usize| {
-        position.size[axis] * ((index as f64 + 0.5) / image.size[axis] as f64 - 0.5)
+        placement.size[axis] * ((index as f64 + 0.5) / image.size[axis] as f64 - 0.5)
     };
     let height = |index: usize| black + f64::from(image.values[index]) * (white - black);
     let point = |index: usize| {
@@ -222,6 +222,6 @@ fn of_vdb(path: &Path, input_hashes: &InputHashes) -> Result<Terrain> {
 }
 
 #[cfg(not(feature = "vdb"))]
-fn of_vdb(path: &Path, _seen: &InputHashes) -> Result<Terrain> {
+fn of_vdb(path: &Path, _input_hashes: &InputHashes) -> Result<Terrain> {
     Err(Error::file(path, "needs OpenVDB, which this frazil was built without"))
 }

@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::geometry::mesh::attributes::{Number, On};
 use crate::geometry::{MeshArray, TriMesh, Vec3};
-use crate::scene::shallow::{Files, Shallow as Of};
+use crate::scene::shallow::{OutputFiles, Shallow as Setup};
 use crate::shallow::Shallow;
 use crate::shallow::free_fall::Droplet;
 use crate::shallow::free_fall::mesh::{Balls, Target as BallTarget};
@@ -14,11 +14,12 @@ use crate::shallow::surface::rim::silhouette::Silhouette;
 use crate::shallow::surface::{Counts, Depths, Indices, Layout, Surface, Target};
 
 /// Minimum height of a wet vertex above its ground, in cells: the ground does not show through a film (thesis 4.2.4).
-const LEAST_DEPTH: f64 = 0.05;
-/// Depth at which a wet vertex reaches its full height, in cells, so that none jumps when its column gets wet or dry.
+const MIN_DEPTH: f64 = 0.05;
+/// Depth at which a wet vertex reaches its minimum height, in cells: it rises gradually, so that it does not jump when its column gets wet
+/// or dry.
 const FADE_DEPTH: f64 = 0.02;
 
-/// Builds meshes; keeps its memory from one to the next.
+/// Builds meshes; its buffers are reused from frame to frame.
 #[derive(Default)]
 pub(in crate::scene::shallow) struct Mesher {
     surface: Surface,
@@ -33,7 +34,7 @@ pub(in crate::scene::shallow) struct Mesher {
 
 /// The surface at a frame, followed by the drops in the air (m, m/s).
 #[derive(Default)]
-pub(in crate::scene::shallow) struct Drawn {
+pub(in crate::scene::shallow) struct LiquidMesh {
     pub mesh: TriMesh,
     /// Velocities of the surface.
     pub velocities: Vec<Vec3>,
@@ -42,20 +43,20 @@ pub(in crate::scene::shallow) struct Drawn {
     /// Opacities: depth / opaque depth, at most 1.
     pub alpha: Vec<f32>,
     pub layers: Vec<u32>,
-    /// Vertices from this one on are in the air; `None` if liquid does not fall.
+    /// First vertex in the air: the drops come last. `None` if liquid does not fall.
     pub falling: Option<usize>,
     /// Scalars by name.
     pub scalars: Vec<(String, Vec<f32>)>,
 }
 
 impl Mesher {
-    /// If a shot wants them, finds minimum heights above the ground (not if that is not a mesh) and where the ground ends.
+    /// Finds minimum heights above the ground, if that is a mesh, and the edges where the ground ends, each if the scene asks for it.
     ///
     /// # Errors
     /// A mesh with a vertex that is not finite.
-    pub fn fit(&mut self, liquid: &Shallow, ground: Option<TriMesh>, of: &Of) -> Result<()> {
+    pub fn fit_to_ground(&mut self, liquid: &Shallow, ground: Option<TriMesh>, setup: &Setup) -> Result<()> {
         let columns = liquid.columns();
-        let ledges = of.skirts.then(|| self.ledges.get_or_insert_default());
+        let ledges = setup.skirts.then(|| self.ledges.get_or_insert_default());
         let Some(TriMesh { positions, triangles }) = &ground else {
             ledges.into_iter().for_each(|ledges| ledges.find(columns));
             return Ok(());
@@ -63,7 +64,7 @@ impl Mesher {
         if let Some(ledges) = ledges {
             self.silhouette.fit(ledges, columns, positions, triangles)?;
         }
-        if of.lifts {
+        if setup.minimum_heights {
             self.lifts.find(columns, positions, triangles, Distance::default())?;
         }
         Ok(())
@@ -73,7 +74,7 @@ impl Mesher {
     ///
     /// # Errors
     /// None for a liquid's own columns.
-    pub fn draw(&mut self, liquid: &Shallow, opaque_depth: f64) -> Result<Drawn> {
+    pub fn build(&mut self, liquid: &Shallow, opaque_depth: f64) -> Result<LiquidMesh> {
         let Self { surface, balls, lifts, ledges, velocity, concentrations, drops, .. } = self;
         let columns = liquid.columns();
         velocity.clear();
@@ -95,53 +96,52 @@ impl Mesher {
         };
         let on_ground = surface.count(columns, &depths)?;
         let all = sum(on_ground, balls.count(drops));
-        let mut drawn = Drawn::with_room(liquid, all, on_ground.vertices);
-        let (mut places, mut speeds) = (vec![0.0; 3 * all.vertices], vec![0.0; 3 * all.vertices]);
+        let mut out = LiquidMesh::with_buffers(liquid, all, on_ground.vertices);
+        let (mut positions, mut velocities) = (vec![0.0; 3 * all.vertices], vec![0.0; 3 * all.vertices]);
         let cell = columns.grid.cell;
         let layout = Layout {
-            least_depth: LEAST_DEPTH * cell,
+            least_depth: MIN_DEPTH * cell,
             fade_depth: if lifts.least().is_empty() { 0.0 } else { FADE_DEPTH * cell },
             opaque_depth,
             ..Layout::default()
         };
         let mut carried = [const { None }; MAX_SCALARS];
-        carried.iter_mut().zip(&mut drawn.scalars).for_each(|(to, (_, own))| *to = Some(&mut own[..]));
+        carried.iter_mut().zip(&mut out.scalars).for_each(|(to, (_, own))| *to = Some(&mut own[..]));
         let mut target = Target {
-            positions: Some(&mut places),
-            velocities: Some(&mut speeds),
-            depths: Some(&mut drawn.depths),
-            opacities: Some(&mut drawn.alpha),
-            layers: Some(&mut drawn.layers),
+            positions: Some(&mut positions),
+            velocities: Some(&mut velocities),
+            depths: Some(&mut out.depths),
+            opacities: Some(&mut out.alpha),
+            layers: Some(&mut out.layers),
             carried,
-            indices: Indices::U32(drawn.mesh.triangles.as_flattened_mut()),
+            indices: Indices::U32(out.mesh.triangles.as_flattened_mut()),
             ..Target::default()
         };
         surface.build(columns, &depths, &layout, &mut target)?;
         let (first, triangle) = (on_ground.vertices, on_ground.indices / 3);
         let mut of_drops = vec![0; all.vertices - first];
         let mut target = BallTarget {
-            positions: Some(&mut places[3 * first..]),
-            velocities: Some(&mut speeds[3 * first..]),
+            positions: Some(&mut positions[3 * first..]),
+            velocities: Some(&mut velocities[3 * first..]),
             drops: Some(&mut of_drops),
-            indices: Indices::U32(drawn.mesh.triangles[triangle..].as_flattened_mut()),
+            indices: Indices::U32(out.mesh.triangles[triangle..].as_flattened_mut()),
             ..BallTarget::default()
         };
         balls.build(drops, &layout, &mut target)?;
-        let in_air = drawn.mesh.triangles[triangle..].as_flattened_mut();
+        let in_air = out.mesh.triangles[triangle..].as_flattened_mut();
         in_air.iter_mut().for_each(|corner| *corner += first as u32);
         for (vertex, drop) in (first..).zip(of_drops) {
-            let deep = 2.0 * drops[drop as usize].radius;
-            drawn.depths[vertex] = deep as f32;
-            drawn.alpha[vertex] = (deep / opaque_depth).min(1.0) as f32;
-            for ((_, own), concentration) in drawn.scalars.iter_mut().zip(drops[drop as usize].concentrations)
-            {
+            let diameter = 2.0 * drops[drop as usize].radius;
+            out.depths[vertex] = diameter as f32;
+            out.alpha[vertex] = (diameter / opaque_depth).min(1.0) as f32;
+            for ((_, own), concentration) in out.scalars.iter_mut().zip(drops[drop as usize].concentrations) {
                 own[vertex] = concentration;
             }
         }
         let vectors = |numbers: &[f32]| numbers.as_chunks::<3>().0.iter().map(|&v| Vec3::from(v)).collect();
-        drawn.mesh.positions = vectors(&places);
-        drawn.velocities = vectors(&speeds);
-        Ok(drawn)
+        out.mesh.positions = vectors(&positions);
+        out.velocities = vectors(&velocities);
+        Ok(out)
     }
 }
 
@@ -150,16 +150,16 @@ fn sum(a: Counts, b: Counts) -> Counts {
     Counts { vertices: a.vertices + b.vertices, extras: a.extras + b.extras, indices: a.indices + b.indices }
 }
 
-impl Drawn {
+impl LiquidMesh {
     /// An empty mesh, with the arrays of a scene's liquid.
-    pub fn empty(of: &Of) -> Self {
+    pub fn empty(setup: &Setup) -> Self {
         let named = |name: &String| (name.clone(), Vec::new());
-        let scalars = of.scalars.iter().map(|carried| named(&carried.scalar.name)).collect();
-        Self { falling: of.params.falls.map(|_| 0), scalars, ..Self::default() }
+        let scalars = setup.scalars.iter().map(|carried| named(&carried.scalar.name)).collect();
+        Self { falling: setup.params.falls.map(|_| 0), scalars, ..Self::default() }
     }
 
     /// Buffers for a mesh of a liquid; the first `on_ground` vertices are its surface.
-    fn with_room(liquid: &Shallow, counts: Counts, on_ground: usize) -> Self {
+    fn with_buffers(liquid: &Shallow, counts: Counts, on_ground: usize) -> Self {
         let Counts { vertices, indices, .. } = counts;
         let scalar = |scalar: &crate::shallow::Scalar| (scalar.name.clone(), vec![0.0; vertices]);
         Self {
@@ -174,7 +174,7 @@ impl Drawn {
     }
 
     /// The requested arrays, besides velocities.
-    pub fn arrays(&self, output: Files) -> Vec<MeshArray> {
+    pub fn arrays(&self, output: OutputFiles) -> Vec<MeshArray> {
         let array =
             |name: &str, number, values| MeshArray { name: name.into(), on: On::Vertices, number, values };
         let floats = |values: &[f32]| values.iter().map(|value| f64::from(*value)).collect();

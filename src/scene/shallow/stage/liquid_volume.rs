@@ -17,8 +17,8 @@ use crate::vdb::{DENSITY_SCALE_KEY, FloatGrid, GridClass, MetaValue};
 
 /// Name of the only grid, as shaders expect it.
 const GRID: &str = "density";
-/// Optical depth at the opaque depth: a twentieth of the light passes through.
-const OPAQUE: f64 = 3.0;
+/// Optical thickness of the opaque depth: a twentieth of the light passes through.
+const OPTICAL_THICKNESS: f64 = 3.0;
 
 /// The volume's description in `shot.usda`.
 pub(in crate::scene::shallow) fn of_shot(kind: &'static str) -> Volume {
@@ -33,19 +33,19 @@ pub(in crate::scene::shallow) fn of_shot(kind: &'static str) -> Volume {
 pub(in crate::scene::shallow) fn bytes(
     ctx: &Context,
     scene: &Scene,
-    of: &Shallow,
+    setup: &Shallow,
     liquid: &shallow::Shallow,
     frame: i32,
     made_from: &str,
 ) -> Result<Vec<u8>> {
     let mut metadata = metadata(scene, frame, made_from);
     metadata.push(("volume_m3".into(), MetaValue::Double(liquid.balance().inside)));
-    let grid = ctx.phase("volume", || density(ctx, liquid, OPAQUE / of.opaque_depth))?;
+    let grid = ctx.phase("volume", || density(ctx, liquid, OPTICAL_THICKNESS / setup.opaque_depth))?;
     to_bytes(&[&grid], &WriteOptions { metadata, ..WriteOptions::default() })
 }
 
-/// The fraction of each voxel that is liquid. Voxels have the edge of a cell and are aligned with cells; in height, their centres are at
-/// multiples of it. A value of 1 means an extinction of `scale` (1/m).
+/// The fraction of each voxel that is liquid. Voxels are as large as cells and aligned with them; the heights of their centres are multiples
+/// of that size. A value of 1 means an extinction of `scale` (1/m).
 fn density(ctx: &Context, liquid: &shallow::Shallow, scale: f64) -> Result<FloatGrid> {
     let (columns, depths) = (liquid.columns(), liquid.depths());
     let (grid, heights) = (columns.grid, columns.heights);

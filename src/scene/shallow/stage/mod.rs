@@ -25,7 +25,7 @@ use crate::scene::run::{
 };
 use crate::shallow;
 use crate::shallow::remap::Moved;
-use liquid_mesh::{Drawn, Mesher};
+use liquid_mesh::{LiquidMesh, Mesher};
 use liquid_state::LiquidState;
 
 /// Name of the stage, and of the kind of its files.
@@ -38,19 +38,19 @@ const TERRAIN: &str = "terrain";
 /// The stage for a scene.
 pub struct Liquid<'a> {
     pub scene: &'a Scene,
-    pub of: &'a Shallow,
+    pub setup: &'a Shallow,
     pub inputs: &'a Inputs,
 }
 
 /// The liquid at a frame.
 pub struct State<'a> {
-    course: LiquidState<'a>,
+    liquid_state: LiquidState<'a>,
     mesher: Mesher,
 }
 
-/// The liquid at a frame whose files are written.
-pub struct Written {
-    drawn: Drawn,
+/// The data of a frame's files.
+pub struct FrameData {
+    surface: LiquidMesh,
     state: Vec<u8>,
     /// A .vdb file.
     volume: Option<Vec<u8>>,
@@ -59,19 +59,19 @@ pub struct Written {
 }
 
 impl<'a> Liquid<'a> {
-    /// Advances the liquid to a frame, which may be the current one, and warns of points that can no longer act.
-    fn go(
+    /// Advances the liquid to a frame, which may be the current one, and warns of points that begin to rest.
+    fn advance(
         &self,
         ctx: &Context,
-        course: &mut LiquidState<'a>,
+        liquid_state: &mut LiquidState<'a>,
         frame: i32,
     ) -> Result<(shallow::Report, Moved)> {
-        if frame <= course.frame {
+        if frame <= liquid_state.frame {
             return Ok(Default::default());
         }
-        let before = course.resting();
-        let did = course.go(ctx)?;
-        for point in course.resting().iter().filter(|point| !before.contains(point)) {
+        let before = liquid_state.resting();
+        let did = liquid_state.advance(ctx)?;
+        for point in liquid_state.resting().iter().filter(|point| !before.contains(point)) {
             let path = self.scene.path.display();
             log::warn!(
                 "{path}: {point}: at frame {frame} it lies inside solid or outside of the area, and rests until it does not"
@@ -80,38 +80,45 @@ impl<'a> Liquid<'a> {
         Ok(did)
     }
 
-    /// The data that a frame's files are made from.
+    /// The data of a frame's files.
     #[cfg_attr(
         not(feature = "vdb"),
-        expect(unused_variables, reason = "volumes say what they are made from")
+        expect(unused_variables, reason = "only volumes hold the hash of their inputs")
     )]
-    fn written(
+    fn frame_data(
         &self,
         ctx: &Context,
         state: &mut State<'a>,
         to: &StepTarget<'_>,
         made_from: &str,
-    ) -> Result<Written> {
-        let State { course, mesher } = state;
-        if std::mem::take(&mut course.is_stirred) {
-            ctx.phase("lifts", || mesher.fit(&course.liquid, course.ground(), self.of))?;
+    ) -> Result<FrameData> {
+        let State { liquid_state, mesher } = state;
+        if std::mem::take(&mut liquid_state.has_new_ground) {
+            ctx.phase("lifts", || {
+                mesher.fit_to_ground(&liquid_state.liquid, liquid_state.ground(), self.setup)
+            })?;
         }
-        let liquid = &course.liquid;
-        let drawn = ctx.phase("surface", || mesher.draw(liquid, self.of.opaque_depth))?;
+        let liquid = &liquid_state.liquid;
+        let surface = ctx.phase("surface", || mesher.build(liquid, self.setup.opaque_depth))?;
         #[cfg(feature = "vdb")]
-        let volume = match self.of.output.vdb {
-            true => Some(liquid_volume::bytes(ctx, self.scene, self.of, liquid, to.frame, made_from)?),
+        let volume = match self.setup.output.vdb {
+            true => Some(liquid_volume::bytes(ctx, self.scene, self.setup, liquid, to.frame, made_from)?),
             false => None,
         };
         #[cfg(not(feature = "vdb"))]
         let volume = None;
-        let state = saved_liquid::save(&course.shapes, &course.points, liquid, course.stains.as_ref());
-        Ok(Written { drawn, state, volume, terrain: course.stained()? })
+        let state = saved_liquid::save(
+            &liquid_state.shapes,
+            &liquid_state.points,
+            liquid,
+            liquid_state.stains.as_ref(),
+        );
+        Ok(FrameData { surface, state, volume, terrain: liquid_state.stained()? })
     }
 
     /// The liquid's material in USD.
     fn look(&self) -> Look {
-        match &*self.of.look {
+        match &*self.setup.look {
             "water" => Look::Water,
             "paint" => Look::Paint,
             "honey" => Look::Honey,
@@ -138,10 +145,10 @@ impl Stage for Liquid<'_> {
     }
 
     fn writes(&self, kind: &str) -> bool {
-        let output = self.of.output;
+        let output = self.setup.output;
         match kind {
             VOLUME => output.vdb,
-            TERRAIN => self.of.staining.is_some(),
+            TERRAIN => self.setup.staining.is_some(),
             _ => output.ply || output.usd,
         }
     }
@@ -155,18 +162,18 @@ impl Stage for Liquid<'_> {
     }
 
     fn usd_kind(&self) -> Option<&'static str> {
-        self.of.output.usd.then_some(NAME)
+        self.setup.output.usd.then_some(NAME)
     }
 
     fn settings(&self) -> Result<Settings> {
         let input_hashes = &self.inputs.input_hashes;
         let mut settings = settings_of(self.scene, NAME, input_hashes, ROLES)?;
-        let content = match self.of.sequence() {
+        let content = match self.setup.sequence() {
             Some(_) => "of each frame".to_string(),
-            None => input_hashes.hash(&self.of.terrain)?,
+            None => input_hashes.hash(&self.setup.terrain)?,
         };
         settings.insert("shallow.terrain".into(), format!("{CONTENT}{content}"));
-        for (index, obstacle) in self.of.obstacles.iter().enumerate() {
+        for (index, obstacle) in self.setup.obstacles.iter().enumerate() {
             if let Some(path) = obstacle.file() {
                 settings.insert(
                     format!("object[{}].file", index + 1),
@@ -182,20 +189,20 @@ impl Stage for Liquid<'_> {
     }
 
     fn reads(&self, frame: i32) -> Reads {
-        let files = self.of.sequence().map(|_| self.of.terrain_at(frame));
+        let files = self.setup.sequence().map(|_| self.setup.terrain_at(frame));
         Reads { files: files.into_iter().collect(), ahead: Vec::new() }
     }
 
     fn volumes(&self) -> Vec<Volume> {
         #[cfg(feature = "vdb")]
-        if self.of.output.vdb {
+        if self.setup.output.vdb {
             return vec![liquid_volume::of_shot(VOLUME)];
         }
         Vec::new()
     }
 
     fn clip(&self) -> Option<Clips<'_>> {
-        let arrays = Drawn::empty(self.of).arrays(self.of.output);
+        let arrays = LiquidMesh::empty(self.setup).arrays(self.setup.output);
         let primvars = primvars::primvars(&arrays.iter().collect::<Vec<&MeshArray>>());
         let mesh = MeshPrim { name: NAME.into(), look: self.look(), moves: true, uvs: None, primvars };
         Some(Clips::new(NAME, ClipPrims::Meshes(vec![mesh])))
@@ -204,32 +211,32 @@ impl Stage for Liquid<'_> {
 
 impl<'a> Stepping for Liquid<'a> {
     type State = State<'a>;
-    type Step = Option<Written>;
+    type Step = Option<FrameData>;
     type Writer = ();
 
     fn load(&self, ctx: &Context, done: &DoneFrames, after: Option<i32>) -> Result<State<'a>> {
-        let of = (self.scene, self.of, self.inputs);
-        let course = match after {
-            None => LiquidState::begin(ctx, of)?,
+        let setup = (self.scene, self.setup, self.inputs);
+        let liquid_state = match after {
+            None => LiquidState::begin(ctx, setup)?,
             Some(frame) => {
                 let path = done.state_file(frame)?;
                 let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
-                LiquidState::resume(ctx, of, frame, &bytes).map_err(|error| match error {
+                LiquidState::resume(ctx, setup, frame, &bytes).map_err(|error| match error {
                     Error::Bytes(what) => Error::file(path, what),
                     other => other,
                 })?
             }
         };
-        Ok(State { course, mesher: Mesher::default() })
+        Ok(State { liquid_state, mesher: Mesher::default() })
     }
 
     fn step(&self, ctx: &Context, state: &mut State<'a>, to: &StepTarget<'_>) -> Result<Stepped<Self::Step>> {
         let ((step, did), phases) = ctx.step(4, || {
-            let did = self.go(ctx, &mut state.course, to.frame)?;
-            let written = to.made_from.map(|made_from| self.written(ctx, state, to, made_from));
-            Ok((written.transpose()?, did))
+            let did = self.advance(ctx, &mut state.liquid_state, to.frame)?;
+            let data = to.made_from.map(|made_from| self.frame_data(ctx, state, to, made_from));
+            Ok((data.transpose()?, did))
         })?;
-        let report = report_of(&state.course, did, step.as_ref(), phases)?;
+        let report = report_of(&state.liquid_state, did, step.as_ref(), phases)?;
         Ok(Stepped { step, report })
     }
 
@@ -242,20 +249,20 @@ impl<'a> Stepping for Liquid<'a> {
     }
 
     fn write(&self, _writer: &mut (), step: Self::Step, files: Option<&mut FrameFiles>) -> Result<()> {
-        let (Some(Written { drawn, state, volume, terrain }), Some(files)) = (step, files) else {
+        let (Some(FrameData { surface, state, volume, terrain }), Some(files)) = (step, files) else {
             return Ok(());
         };
-        let output = self.of.output;
-        let arrays = drawn.arrays(output);
+        let output = self.setup.output;
+        let arrays = surface.arrays(output);
         let arrays: Vec<&MeshArray> = arrays.iter().collect();
         if output.ply {
-            let velocities = if output.velocities { &drawn.velocities[..] } else { &[] };
+            let velocities = if output.velocities { &surface.velocities[..] } else { &[] };
             let carried = mesh::Carried { velocities, uvs: None, arrays: &arrays };
-            files.save(NAME, "ply", &mesh::ply_bytes(&drawn.mesh, &carried))?;
+            files.save(NAME, "ply", &mesh::ply_bytes(&surface.mesh, &carried))?;
         }
         if output.usd {
-            let carried = mesh::Carried { velocities: &drawn.velocities, uvs: None, arrays: &arrays };
-            files.save_clip(NAME, self.scene.shot.fps, &drawn.mesh, &carried)?;
+            let carried = mesh::Carried { velocities: &surface.velocities, uvs: None, arrays: &arrays };
+            files.save_clip(NAME, self.scene.shot.fps, &surface.mesh, &carried)?;
         }
         if let Some(volume) = volume {
             files.save(VOLUME, "vdb", &volume)?;
@@ -272,26 +279,18 @@ impl<'a> Stepping for Liquid<'a> {
 
 /// The report of a frame.
 fn report_of(
-    course: &LiquidState<'_>,
+    liquid_state: &LiquidState<'_>,
     (report, moved): (shallow::Report, Moved),
-    written: Option<&Written>,
+    data: Option<&FrameData>,
     phases: Vec<PhaseTime>,
 ) -> Result<Report> {
-    let liquid = &course.liquid;
+    let liquid = &liquid_state.liquid;
     let (balance, depths) = (liquid.balance(), liquid.depths());
     let wet = depths.iter().filter(|depth| **depth > 0).count();
     let deepest = depths.iter().copied().max().unwrap_or(0);
-    let mesh = written.map(|written| &written.drawn.mesh);
+    let mesh = data.map(|data| &data.surface.mesh);
     let ml = |cubic: f64| cubic / ML;
     let results = json!({
-        "inside_ml": ml(balance.inside),
-        "poured_ml": ml(balance.poured),
-        "sourced_ml": ml(balance.sourced),
-        "drained_ml": ml(balance.drained),
-        "absorbed_ml": ml(balance.absorbed),
-        "lost_ml": ml(balance.lost),
-        "gained_ml": ml(balance.gained),
-        "falling_ml": ml(balance.falling),
         "missing_units": balance.error,
         "drops": liquid.drops().len(),
         "scalars": scalars::balances(liquid)?,
@@ -299,7 +298,7 @@ fn report_of(
         "deepest_m": liquid.columns().heights.length(deepest.into()),
         "displaced_ml": ml(moved.displaced),
         "held_ml": ml(moved.held),
-        "resting": course.resting(),
+        "resting": liquid_state.resting(),
         "steps": report.steps,
         "simulated_s": liquid.time(),
         "emptied_rows": report.emptied,
@@ -308,5 +307,7 @@ fn report_of(
         "vertices": mesh.map_or(0, |mesh| mesh.positions.len()),
         "triangles": mesh.map_or(0, |mesh| mesh.triangles.len()),
     });
-    Ok(Report::new(results, phases))
+    let mut report = Report::new(results, phases);
+    report.results.extend(scalars::amounts_in_ml!(balance));
+    Ok(report)
 }

@@ -1,4 +1,4 @@
-//! The liquid at a frame as bytes: its own state, and its obstacles and flow points at that time, which may be replaced later.
+//! The liquid at a frame as bytes: its own state, and its obstacles and flow points at that frame, which a resumed run may replace.
 
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
@@ -23,7 +23,7 @@ pub(in crate::scene::shallow) struct SavedLiquid {
     pub points: Vec<FlowPoint>,
     /// Its own state.
     pub liquid: Vec<u8>,
-    /// Its stains; empty if it leaves none.
+    /// Its stains; empty if it does not stain.
     pub stains: Vec<u8>,
 }
 

@@ -55,7 +55,7 @@ impl Forecast {
         }
         let params = params(scene, inputs.snow.cell);
         let takers = scene.objects.iter().enumerate().filter(|(_, object)| object.role.removes());
-        let own = |index| scene.values.one(OBJECT, index).find("compression");
+        let own = |index| scene.values.element(OBJECT, index).find("compression");
         let all: Vec<f64> = takers.map(|(index, _)| own(index).unwrap_or(params.compression)).collect();
         let compression = all.iter().copied().reduce(f64::min).unwrap_or(params.compression);
         let grain = std::f64::consts::PI / 6.0 * (2.0 * params.radius).powi(3);

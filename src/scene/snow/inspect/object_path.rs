@@ -57,7 +57,7 @@ impl<'a> ObjectPath<'a> {
     pub fn all(ctx: &Context, scene: &'a Scene, inputs: &'a Inputs) -> Result<Vec<Self>> {
         let colliders = scene.objects.iter().enumerate().filter(|(_, object)| object.role.moves());
         let of = |((index, object), body): ((usize, &'a Object), &'a Body)| {
-            let name = format!("object {} ({})", index + 1, crate::scene::schema::name(&object.file));
+            let name = format!("object {} ({})", index + 1, crate::scene::schema::file_name(&object.file));
             let extents = ctx.phase("inputs", || extents(ctx, scene, body))?;
             Ok(Self { scene, inputs, name, object, body, extents })
         };

@@ -12,7 +12,9 @@ pub(in crate::scene::snow) fn replaced(values: &Values) -> Vec<String> {
     let pairs = [("friction", "repose_angle_deg"), ("attraction", "stands")];
     let given = pairs.into_iter().filter_map(|(key, other)| Some((key, number(key)?, other, number(other)?)));
     given
-        .filter(|(_, _, other, value)| values.declared("grains", other) != Some(Value::Number(*value)))
+        .filter(|(_, _, other, value)| {
+            values.declared_default("grains", other) != Some(Value::Number(*value))
+        })
         .map(|(key, own, other, value)| {
             format!("grains.{key} = {own} replaces grains.{other} = {value}, which has no effect")
         })

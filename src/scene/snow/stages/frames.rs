@@ -11,7 +11,7 @@ use crate::vdb::file;
 /// # Errors
 /// A missing frame; a file that is not what was written.
 pub(in crate::scene::snow) fn grids(ctx: &Context, done: &DoneFrames, frame: i32) -> Result<Grids> {
-    let mut frames = done.frames_to(frame)?;
+    let mut frames = done.frames_of_state(frame)?;
     let whole = frames.next().unwrap_or(frame);
     let mut grids = read_grids(done, whole)?;
     for later in frames {

@@ -77,7 +77,7 @@ impl<'a> Grains<'a> {
     pub fn new(scene: &'a Scene, inputs: &'a Inputs) -> Self {
         let moving = scene.objects.iter().enumerate().filter(|(_, object)| object.role.moves());
         let object = |((index, object), body): ((usize, &scene::Object), &'a Body)| {
-            let own = scene.values.one(OBJECT, index);
+            let own = scene.values.element(OBJECT, index);
             Object {
                 body,
                 friction: own.get("friction"),
