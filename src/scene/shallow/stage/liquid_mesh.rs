@@ -24,7 +24,7 @@ const FADE_DEPTH: f64 = 0.02;
 pub(in crate::scene::shallow) struct Mesher {
     surface: Surface,
     balls: Balls,
-    lifts: MinimumHeights,
+    minimum_heights: MinimumHeights,
     ledges: Option<Ledges>,
     silhouette: Silhouette,
     velocity: Vec<[f32; 2]>,
@@ -65,7 +65,7 @@ impl Mesher {
             self.silhouette.fit(ledges, columns, positions, triangles)?;
         }
         if setup.minimum_heights {
-            self.lifts.find(columns, positions, triangles, Distance::default())?;
+            self.minimum_heights.find(columns, positions, triangles, Distance::default())?;
         }
         Ok(())
     }
@@ -75,7 +75,7 @@ impl Mesher {
     /// # Errors
     /// None for a liquid's own columns.
     pub fn build(&mut self, liquid: &Shallow, opaque_depth: f64) -> Result<LiquidMesh> {
-        let Self { surface, balls, lifts, ledges, velocity, concentrations, drops, .. } = self;
+        let Self { surface, balls, minimum_heights, ledges, velocity, concentrations, drops, .. } = self;
         let columns = liquid.columns();
         velocity.clear();
         velocity.extend((0..columns.len()).map(|index| liquid.velocity(index)));
@@ -88,8 +88,8 @@ impl Mesher {
         let depths = Depths {
             depth: liquid.depths(),
             velocity,
-            least: lifts.least(),
-            sunk: lifts.sunk(),
+            least: minimum_heights.least(),
+            sunk: minimum_heights.sunk(),
             ledges: ledges.as_ref(),
             carried: concentrations.each_ref().map(|numbers| &numbers[..]),
             ..Depths::default()
@@ -101,7 +101,7 @@ impl Mesher {
         let cell = columns.grid.cell;
         let layout = Layout {
             least_depth: MIN_DEPTH * cell,
-            fade_depth: if lifts.least().is_empty() { 0.0 } else { FADE_DEPTH * cell },
+            fade_depth: if minimum_heights.least().is_empty() { 0.0 } else { FADE_DEPTH * cell },
             opaque_depth,
             ..Layout::default()
         };

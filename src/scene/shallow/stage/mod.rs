@@ -215,13 +215,13 @@ impl<'a> Stepping for Liquid<'a> {
     type Writer = ();
 
     fn load(&self, ctx: &Context, done: &DoneFrames, after: Option<i32>) -> Result<State<'a>> {
-        let setup = (self.scene, self.setup, self.inputs);
+        let inputs = (self.scene, self.setup, self.inputs);
         let liquid_state = match after {
-            None => LiquidState::begin(ctx, setup)?,
+            None => LiquidState::begin(ctx, inputs)?,
             Some(frame) => {
                 let path = done.state_file(frame)?;
                 let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
-                LiquidState::resume(ctx, setup, frame, &bytes).map_err(|error| match error {
+                LiquidState::resume(ctx, inputs, frame, &bytes).map_err(|error| match error {
                     Error::Bytes(what) => Error::file(path, what),
                     other => other,
                 })?
