@@ -25,7 +25,7 @@ const MOST: usize = 5000;
 
 /// Prints it.
 pub fn tables() {
-    let near = Matching { reach: REACH, most: MOST, ..Matching::default() };
+    let near = Matching { reach: REACH, max_iterations: MOST, ..Matching::default() };
     let whole = Matching { reach: i32::MAX, ..near };
     title(
         &format!(
@@ -41,7 +41,7 @@ pub fn tables() {
         let nodes = balls(scale, 0.0);
         let set = Set { ctx: &ctx, name, nodes: &nodes };
         let exact = set.exact(&near);
-        set.row(&exact, "no iteration", Matching { most: 0, ..near });
+        set.row(&exact, "no iteration", Matching { max_iterations: 0, ..near });
         for factor in factors {
             set.row(&exact, &format!("factor {factor:.2}"), Matching { omega: Some(*factor), ..near });
         }

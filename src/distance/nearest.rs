@@ -45,8 +45,8 @@ impl Group<'_> {
     /// All triangles within this distance (cells) of one of the voxels, and some that are farther away.
     pub fn within(&self, cells: f32) -> Vec<u32> {
         let (far, sub_block) = self.far;
-        let most = (cells + RADII[0]).powi(2);
-        let near = far.iter().zip(0..).filter(|(offset, _)| offset.squared[sub_block] <= most);
+        let max_squared = (cells + RADII[0]).powi(2);
+        let near = far.iter().zip(0..).filter(|(offset, _)| offset.squared[sub_block] <= max_squared);
         near.map(|(_, id)| id).collect()
     }
 }
@@ -86,8 +86,8 @@ pub fn search(
                 near.push(some[at]);
                 centre.push([offset.x[lane], offset.y[lane], offset.z[lane], offset.squared[lane]]);
             });
-            let least = centre.iter().map(|offset| offset[3]).fold(f32::INFINITY, f32::min).sqrt();
-            let complete = (least + RADII[1]).min(reach);
+            let nearest_centre = centre.iter().map(|offset| offset[3]).fold(f32::INFINITY, f32::min).sqrt();
+            let complete = (nearest_centre + RADII[1]).min(reach);
             few.clone_from(near);
             prune(few, centre);
             let points = points(corner, 1.0, 0.0);

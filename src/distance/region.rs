@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::geometry::coords::is_between;
 
 /// Maximum number of blocks of a region: a `u32` for each then takes 1 GiB.
-const MOST_BLOCKS: u64 = 1 << 28;
+const MAX_BLOCKS: u64 = 1 << 28;
 
 /// A box of blocks of 8^3 voxels; coordinates count blocks from the lattice's origin voxel.
 pub struct Region {
@@ -22,25 +22,25 @@ impl Region {
     /// # Errors
     /// When the box spans more than 2^28 blocks.
     pub fn around(faces: &[Face], margin: f32, low: [i32; 3], high: [i32; 3]) -> Result<Self> {
-        let (mut least, mut most) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
         for face in faces {
             let (low, high) = extent(&face.v);
             for axis in 0..3 {
-                least[axis] = least[axis].min(low[axis]);
-                most[axis] = most[axis].max(high[axis]);
+                min[axis] = min[axis].min(low[axis]);
+                max[axis] = max[axis].max(high[axis]);
             }
         }
         let mut region = Self {
-            low: [0, 1, 2].map(|a| block_of(least[a] - margin).max(block_of(low[a] as f32 - margin))),
-            high: [0, 1, 2].map(|a| block_of(most[a] + margin).min(block_of(high[a] as f32 + margin))),
+            low: [0, 1, 2].map(|a| block_of(min[a] - margin).max(block_of(low[a] as f32 - margin))),
+            high: [0, 1, 2].map(|a| block_of(max[a] + margin).min(block_of(high[a] as f32 + margin))),
         };
         if (0..3).any(|axis| region.low[axis] > region.high[axis]) {
             region = Self { low: [0; 3], high: [-1; 3] };
         }
         let blocks = region.size().iter().map(|&size| size as u64).product::<u64>();
-        if blocks > MOST_BLOCKS {
+        if blocks > MAX_BLOCKS {
             let what = "the region that the objects sweep (make the cell larger or the motion shorter)";
-            return Err(Error::Memory { what: what.into(), needed: blocks * 8, limit: MOST_BLOCKS * 8 });
+            return Err(Error::Memory { what: what.into(), needed: blocks * 8, limit: MAX_BLOCKS * 8 });
         }
         Ok(region)
     }
@@ -67,7 +67,7 @@ impl Region {
     }
 
     /// The block with this index.
-    pub fn position(&self, index: usize) -> [i32; 3] {
+    pub fn block(&self, index: usize) -> [i32; 3] {
         let [_, ny, nz] = self.size();
         let at = [index / (ny * nz), index / nz % ny, index % nz];
         [0, 1, 2].map(|axis| self.low[axis] + at[axis] as i32)

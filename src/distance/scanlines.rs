@@ -25,7 +25,7 @@ impl Columns {
 
     /// Adds a column between `low` and `high`, unless the set contains it.
     pub fn add(&mut self, column: [i32; 2]) {
-        let position = self.position(column).expect("between the least and the greatest");
+        let position = self.position(column).expect("the column lies within the bounds");
         if self.indices[position] == NONE {
             self.indices[position] = self.positions.len() as u32;
             self.positions.push(column);

@@ -73,8 +73,8 @@ impl Lines {
     }
 
     /// The minimum winding number on any line, or 0.
-    pub fn least_winding(&self) -> i32 {
-        self.crossings.items().iter().fold(0, |least, (_, winding)| least.min(*winding))
+    pub fn min_winding(&self) -> i32 {
+        self.crossings.items().iter().fold(0, |min, (_, winding)| min.min(*winding))
     }
 
     /// Calls `see` with the coordinates and crossings of each line that has any.
@@ -107,7 +107,7 @@ impl Axis {
 
     /// A position in right-handed coordinates whose third axis runs along the lines (downward for y), and in which the symbolic shift of
     /// the first two is positive, with the first one larger.
-    pub fn turned(self, [x, y, z]: Fixed) -> [i64; 3] {
+    pub fn rotated(self, [x, y, z]: Fixed) -> [i64; 3] {
         let [x, y, z] = [x, y, z].map(i64::from);
         match self {
             Self::X => [-z, y, x],
@@ -116,7 +116,7 @@ impl Axis {
         }
     }
 
-    /// Whether a plane with this normal (turned) passes below a voxel that lies in the plane, after the symbolic shift.
+    /// Whether a plane with this normal (rotated) passes below a voxel that lies in the plane, after the symbolic shift.
     fn is_below(self, [p, q, along]: [i64; 3]) -> bool {
         let shifts = match self {
             Self::X => [p, along, q],
@@ -154,7 +154,7 @@ impl Axis {
         }
     }
 
-    /// Bounds of turned coordinates p and q of the lines through voxels within a box.
+    /// Bounds of rotated coordinates p and q of the lines through voxels within a box.
     pub fn bounds(self, low: [i32; 3], high: [i32; 3]) -> [[i64; 2]; 2] {
         let [low, high] = [low, high].map(|p| p.map(i64::from));
         match self {
@@ -165,11 +165,11 @@ impl Axis {
     }
 }
 
-/// Whether the line through voxels with these coordinates passes left of the path from `a` to `b`, seen with the first turned coordinate
-/// ([`Axis::turned`]) to the right and the second upward; exact, under the symbolic shift. Swapping `a` and `b` negates it; it is undefined
+/// Whether the line through voxels with these coordinates passes left of the path from `a` to `b`, seen with the first rotated coordinate
+/// ([`Axis::rotated`]) to the right and the second upward; exact, under the symbolic shift. Swapping `a` and `b` negates it; it is undefined
 /// if they are the same point.
 pub fn passes_left(axis: Axis, a: Fixed, b: Fixed, [p, q]: [i32; 2]) -> bool {
-    let [a, b] = [a, b].map(|end| axis.turned(end)).map(|[p, q, _]| [p, q]);
+    let [a, b] = [a, b].map(|end| axis.rotated(end)).map(|[p, q, _]| [p, q]);
     let p = if axis == Axis::Z { p } else { -p };
     let line = [p, q].map(|value| i64::from(value) * i64::from(UNITS));
     left_of(a, b, edge_function(a, b, line))
@@ -183,7 +183,7 @@ pub fn each_crossing(
     bounds: [[i64; 2]; 2],
     mut see: impl FnMut([i32; 2], f64, i32),
 ) {
-    let v = face.v.map(|p| axis.turned(p));
+    let v = face.v.map(|p| axis.rotated(p));
     let flat = v.map(|p| [p[0], p[1]]);
     let area = edge_function(flat[0], flat[1], flat[2]);
     if area == 0 {
@@ -212,7 +212,7 @@ pub fn each_crossing(
                 } else {
                     height
                 };
-                // The first turned coordinate of lines along x and y is -z.
+                // The first rotated coordinate of lines along x and y is -z.
                 let line = [if axis == Axis::Z { p } else { -p }, q].map(|value| value as i32);
                 see(line, mirror * height, change);
             }
@@ -220,7 +220,7 @@ pub fn each_crossing(
     }
 }
 
-/// Whether the plane of a face (turned) passes below a voxel (turned, in cells), exactly.
+/// Whether the plane of a face (rotated) passes below a voxel (rotated, in cells), exactly.
 fn passes_below(v: &[[i64; 3]; 3], axis: Axis, voxel: [i64; 3]) -> bool {
     let [e, f] = [1, 2].map(|corner| [0, 1, 2].map(|a| v[corner][a] - v[0][a]));
     let normal = [0, 1, 2].map(|a| {

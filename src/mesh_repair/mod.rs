@@ -20,7 +20,7 @@
 //! | outer | of a face or an edge of the grid: some of the cells around it are rebuilt, and some are not |
 //! | rim | where the mesh passes through outer faces: the cut |
 //! | sound | of an outer edge: the mesh crosses it once if its ends differ, else not at all |
-//! | rung | rebuild level, a step of the fall-backs: how much is rebuilt when less did not work |
+//! | rebuild level | a step of the fall-backs: how much is rebuilt when less did not work |
 
 mod attributes;
 mod cut;
@@ -81,7 +81,7 @@ pub struct RepairReport {
     /// Triangles of the input mesh that are still there, whole.
     pub kept_triangles: usize,
     /// Rebuild level reached: 0 the cells themselves, 1 with a ring around them, 2 the parts of the mesh that they touch, 3 everything.
-    pub rung: usize,
+    pub rebuild_level: usize,
     /// New triangles with an altitude below 1e-4 of an edge.
     pub slivers: usize,
     /// What it has lost.
@@ -163,7 +163,7 @@ fn rebuild(ctx: &Context, closed: &Closed, own: usize, cell: f64) -> Result<Opti
         cell,
         flagged_cells: flagged.count(),
         rebuilt_cells: rebuilt.cells,
-        rung: rebuilt.rung,
+        rebuild_level: rebuilt.rebuild_level,
         slivers: rebuilt.slivers,
         ..RepairReport::default()
     };
@@ -176,8 +176,8 @@ pub(super) struct Rebuilt {
     pub draft: Draft,
     /// Cells that were rebuilt.
     pub cells: usize,
-    /// See [`RepairReport::rung`].
-    pub rung: usize,
+    /// See [`RepairReport::rebuild_level`].
+    pub rebuild_level: usize,
     /// See [`RepairReport::slivers`].
     pub slivers: usize,
 }
@@ -194,9 +194,9 @@ pub(super) fn ladder(
     flagged: &CellSet,
     inside: &impl Inside,
 ) -> Result<Rebuilt> {
-    for rung in 0..4 {
+    for rebuild_level in 0..4 {
         ctx.check()?;
-        let set = match rung {
+        let set = match rebuild_level {
             0 => flagged.clone(),
             1 => flagged.with_ring(),
             2 => region::faulty_cells::parts(shape, flagged),
@@ -209,8 +209,8 @@ pub(super) fn ladder(
         let Some((mut draft, cells)) = tried(ctx, shape, set, in_cells, inside)? else { continue };
         let slivers = tidied(&mut draft, lattice);
         let is_whole = Topology::of(draft.positions.len(), &draft.triangles).is_watertight();
-        if draft.triangles.is_empty() || (is_whole && (slivers == 0 || rung == 3)) {
-            return Ok(Rebuilt { draft, cells, rung, slivers });
+        if draft.triangles.is_empty() || (is_whole && (slivers == 0 || rebuild_level == 3)) {
+            return Ok(Rebuilt { draft, cells, rebuild_level, slivers });
         }
     }
     Err(Error::Internal("a mesh could not be rebuilt".into()))
@@ -332,7 +332,7 @@ mod tests {
         let faults = Faults::of(&repaired.mesh);
         assert!(faults.by_index.is_watertight() && faults.is_embedded(), "{faults:?}");
         assert_eq!(
-            (faults.parts, faults.genus, repaired.report.rung),
+            (faults.parts, faults.genus, repaired.report.rebuild_level),
             (1, Some(0), 0),
             "{:?}",
             repaired.report

@@ -6,9 +6,9 @@
 //! (`level_set/implicit.rs`), converted to signed distances (`level_set/band.rs`). Where this would move vertices too far, the liquid has
 //! merged or split: they are flagged, and so are those beside which the mesh does not cover the surface (`topology/coverage.rs`).
 //!
-//! There the mesh is changed (`topology/change.rs`): its own signed distances take the topology of phi (`topology/mesh_distance.rs`,
-//! `topology/matching/`), and it is cut and rebuilt in the cells where it no longer fits (`mesh_repair`). Parts without liquid are removed
-//! (`topology/dry_parts.rs`), stretched edges are split and compressed ones collapsed (`remesh/`).
+//! There the mesh is changed (`topology/update.rs`, `topology/change.rs`): its own signed distances take the topology of phi
+//! (`topology/mesh_distance.rs`, `topology/matching/`), and it is cut and rebuilt in the cells where it no longer fits (`mesh_repair`). Parts
+//! without liquid are removed (`topology/dry_parts.rs`), stretched edges are split and compressed ones collapsed (`remesh/`).
 //!
 //! # Glossary
 //!
@@ -17,13 +17,14 @@
 //! | spacing, r | initial distance between particles |
 //! | cell, node | the grid's spacing, half of r; a corner of the grid, where phi is known |
 //! | phi | the implicit function of the particles; then the signed distance from its zero set, negative inside |
-//! | fading | delta shrinks: detail of a runny liquid is not retained |
 //! | delta | the distance from phi = 0 that a vertex keeps: its detail, with the sign of phi |
+//! | fading | delta shrinks: detail of a runny liquid is not retained |
 //! | patch | 4 x 4 x 4 nodes, which are evaluated together |
-//! | foot | the position on phi = 0 that belongs to a vertex: the vertex without its detail |
+//! | foot | the projection of a vertex onto phi = 0: the vertex without its detail |
+//! | covered | of a position on phi = 0: a triangle of feet is near it |
 //! | Gamma, psi | the signed distance from the mesh; Gamma - phi |
 //! | change | how a step changed the mesh's vertices and triangles, where it was rebuilt or improved |
-//! | flagged | of a vertex: its projection failed or jumped (it stays where advection put it), or there is surface beside its foot that no triangle of feet covers |
+//! | flagged | of a vertex: its projection failed or jumped (it stays where advection put it), or there is uncovered surface beside its foot |
 
 // Kernels index several arrays by one lane or axis.
 #![allow(clippy::needless_range_loop)]
@@ -43,7 +44,7 @@ mod tracked_mesh;
 mod tracker;
 
 pub use crate::surface::params::Weighting;
-pub use crate::surface::particles::paths::Mismatch;
+pub use crate::surface::particles::paths::VelocityMismatch;
 pub use level_set::SUPPORT;
 pub use level_set::band::Distances;
 pub use level_set::implicit::Implicit;
@@ -78,7 +79,7 @@ pub use tracked_mesh::Tracker;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 
-/// Particles of a frame; all arrays that are not empty have one value for each.
+/// Particles of a frame; each array that is not empty has one value for each particle.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Particles {
     /// Positions (m).

@@ -17,15 +17,15 @@ pub struct Params {
     pub half_life: f64,
     /// How much detail fades where the mesh is strained: to exp(-fade) of it when lengths change by a factor of e; 0..=1000.
     pub fade: f64,
-    /// Whether the mesh is rebuilt where the liquid merges or splits (thesis 2.4, 2.5); it must then be a closed 2-manifold by index. Else
-    /// vertices are only flagged there.
+    /// Whether the mesh is rebuilt where the liquid merges or splits (thesis 2.4, 2.5); it must then be a closed 2-manifold by index. If
+    /// not, vertices are only flagged there.
     pub rebuild: bool,
     /// If it is rebuilt: whether its topology is matched to that of the particles everywhere and in every step (thesis 2.8), including
-    /// bubbles; else where vertices are flagged, and at drops.
+    /// bubbles; if not, only where vertices are flagged, and at drops.
     pub every: bool,
     /// If it is rebuilt: minimum count of particles in a part of the mesh, 0..=1,000,000. Parts with fewer are removed, and drops with fewer
-    /// get no mesh; with 0 and 1 only parts without any inside are removed. If some lie inside, those beside the part, within half a
-    /// spacing, count too. A mesh of one part stays.
+    /// get no mesh; with 0 and 1 only parts without any particle inside are removed. If at least one lies inside, those outside within half
+    /// a spacing of the part count too. The last part is never removed.
     pub min_drop: usize,
 }
 

@@ -1,11 +1,11 @@
-//! Work on many items in parallel, which a cancel ends.
+//! Parallel, cancellable map over chunks of a slice.
 
 use rayon::prelude::*;
 
 use crate::context::Context;
 use crate::error::Result;
 
-/// What `of` makes of pieces of `size` items, given the index of their first, in their order.
+/// Calls `of` with chunks of `size` items, and the index of each chunk's first item; returns the results in the order of the chunks.
 ///
 /// # Errors
 /// Cancel.

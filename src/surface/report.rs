@@ -22,7 +22,7 @@ pub struct StepReport {
     /// Triangles of the particles' own surface.
     pub triangles: usize,
     /// Parts of that surface that the mesh does not cover, the largest first: drops and bubbles.
-    pub apart: Vec<UncoveredPart>,
+    pub uncovered_parts: Vec<UncoveredPart>,
     /// Changes to the mesh where it was rebuilt or improved; none: vertices and triangles are as before.
     pub change: Option<Change>,
     /// A sentence that describes how ids, velocities and positions of the particles contradict each other.
@@ -44,7 +44,7 @@ impl StepReport {
         self.mesh_warnings.iter().chain(&self.particle_warning)
     }
 
-    /// Warnings to log: all of the mesh, and the first one of the particles; after it, `has_warned` is set.
+    /// Warnings to log: all about the mesh, and one about the particles unless `has_warned` is set, which it then is.
     pub fn new_warnings(&self, has_warned: &mut bool) -> impl Iterator<Item = &String> {
         let of_particles = self.particle_warning.as_ref().filter(|_| !std::mem::replace(has_warned, true));
         self.mesh_warnings.iter().chain(of_particles)
@@ -66,7 +66,7 @@ impl StepReport {
             born: self.born + next.born,
             died: self.died + next.died,
             triangles: next.triangles,
-            apart: next.apart,
+            uncovered_parts: next.uncovered_parts,
             change: match (self.change, next.change) {
                 (Some(first), Some(second)) => Some(second.after(&first)),
                 (first, second) => second.or(first),

@@ -18,7 +18,8 @@ const MAGIC: &Magic = b"frzsrf04";
 const NOUN: &str = "surface";
 
 impl Tracker {
-    /// The exact state, the same bytes for any number of threads; triangles and detail retention are included only if the mesh was rebuilt.
+    /// The exact state, the same bytes for any number of threads; triangles, detail retention and sizes are included only if the mesh was
+    /// rebuilt.
     pub fn save(&self) -> Vec<u8> {
         let mut to = Writer::default();
         [self.params.spacing, self.params.cell, self.reach].into_iter().for_each(|number| to.f64(number));
@@ -40,7 +41,10 @@ impl Tracker {
         self.vertices.iter().flatten().for_each(|part| to.f64(*part));
         to.f32s(&self.delta);
         to.0.extend(
-            self.flags.iter().zip(&self.bare).map(|(flag, bare)| u8::from(*flag) | u8::from(*bare) << 1),
+            self.flags
+                .iter()
+                .zip(&self.never_covered)
+                .map(|(flag, never_covered)| u8::from(*flag) | u8::from(*never_covered) << 1),
         );
         packed::pack(&to.0, MAGIC)
     }
@@ -98,7 +102,7 @@ impl Tracker {
         fail_if(is_wild, || wrong("has a distance that is not finite"))?;
         let bits = from.bytes(count)?;
         from.end()?;
-        let [flags, bare] = [1, 2].map(|bit| bits.iter().map(|bits| bits & bit != 0).collect());
+        let [flags, never_covered] = [1, 2].map(|bit| bits.iter().map(|bits| bits & bit != 0).collect());
         let sizes = match (params.rebuild, is_rebuilt) {
             (false, _) => Vec::new(),
             (true, true) if own.len() == count => own,
@@ -115,11 +119,11 @@ impl Tracker {
             (true, _) => return Err(wrong("has displacements that do not fit")),
         };
         let own = Self::of(params, vertices, triangles);
-        Ok(Self { delta, detail_retention, flags, bare, reach, is_rebuilt, sizes, drift, ..own })
+        Ok(Self { delta, detail_retention, flags, never_covered, reach, is_rebuilt, sizes, drift, ..own })
     }
 }
 
-/// A list whose items take this many bytes each, after its length.
+/// Reads a list: its length, then its items of this many bytes each.
 fn list<T>(
     from: &mut Reader<'_>,
     bytes: usize,
@@ -129,7 +133,7 @@ fn list<T>(
     (0..count).map(|_| item(from)).collect()
 }
 
-/// The drift of a state.
+/// Reads the drift.
 fn drift(from: &mut Reader<'_>) -> Result<Drift> {
     let steps = from.u32()?;
     let vertices = list(from, 12, |from| from.f32s::<3>())?;

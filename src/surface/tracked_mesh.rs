@@ -1,9 +1,9 @@
-//! The mesh of a tracker, and what it knows of the liquid.
+//! The state of a tracker: its mesh, the detail of each vertex, and settings.
 
 use super::params::Params;
 use super::remesh::Size;
 use super::remesh::drift::Drift;
-use super::track::ahead::Ahead;
+use super::track::prefetch::Prefetch;
 use crate::error::{Error, Result, fail_if};
 use crate::geometry::{DVec3, TriMesh};
 
@@ -29,8 +29,8 @@ pub struct Tracker {
     pub(super) detail_retention: Vec<f32>,
     /// Vertices where the last step found a change.
     pub(super) flags: Vec<bool>,
-    /// Vertices beside which the mesh has never covered the surface, since the first frame: this is not reported as a change.
-    pub(super) bare: Vec<bool>,
+    /// Vertices with surface beside them that the mesh did not cover at the first frame, nor since: this is not reported as a change.
+    pub(super) never_covered: Vec<bool>,
     /// Distance from the surface up to which distances are known (r).
     pub(super) reach: f64,
     /// Whether the triangles are no longer the initial ones.
@@ -39,15 +39,15 @@ pub struct Tracker {
     pub(super) sizes: Vec<Size>,
     /// Displacements of the vertices over the last steps; empty if the mesh is not rebuilt.
     pub(super) drift: Drift,
-    /// Prefetched data of the coming particles.
-    pub(super) ahead: Ahead,
+    /// Prefetched surface of the coming particles.
+    pub(super) prefetch: Prefetch,
 }
 
 impl Tracker {
-    /// A mesh, with vertices at these positions (m), of which nothing else is known.
+    /// A mesh with vertices at these positions (m); all other state is empty.
     pub(super) fn of(params: Params, vertices: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
-        let (delta, detail_retention, flags, bare, sizes) = Default::default();
-        let (reach, is_rebuilt, drift, ahead) = (REACH[0], false, Drift::default(), Ahead::default());
+        let (delta, detail_retention, flags, never_covered, sizes) = Default::default();
+        let (reach, is_rebuilt, drift, prefetch) = (REACH[0], false, Drift::default(), Prefetch::default());
         Self {
             params,
             vertices,
@@ -55,12 +55,12 @@ impl Tracker {
             delta,
             detail_retention,
             flags,
-            bare,
+            never_covered,
             reach,
             is_rebuilt,
             sizes,
             drift,
-            ahead,
+            prefetch,
         }
     }
 

@@ -1,4 +1,4 @@
-//! The mesh, frame by frame.
+//! The steps of a tracker, from one frame to the next.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use super::level_set::implicit::Implicit;
 use super::level_set::isosurface::Isosurface;
 use super::level_set::sampler::Sampler;
 use super::params::Params;
-use super::particles::agreement::warn_of_tears;
+use super::particles::agreement::warn_of_lost_mesh;
 use super::particles::paths::Paths;
 use super::remesh::drift::Drift;
 use super::remesh::sizes;
@@ -20,9 +20,9 @@ use super::topology::lost_vertices::gather;
 use super::topology::particle_count::ParticleCountTest;
 use super::topology::uncovered_parts::{MissingParts, Parts, UncoveredPart, Wanted};
 use super::track::advect::{advect, validate_step};
-use super::track::ahead::Ahead;
 use super::track::deep_detail::{Deep, covers, sorted};
 use super::track::fade::fade;
+use super::track::prefetch::Prefetch;
 use super::track::project::foot;
 use super::tracked_mesh::{REACH, Tracker};
 use crate::context::Context;
@@ -31,26 +31,26 @@ use crate::geometry::check::topology::Topology;
 use crate::geometry::coords::cell_of;
 use crate::geometry::{DVec3, TriMesh};
 
-/// How far the band reaches (r), tried one after the other at the first frame, around vertices that have not found the surface.
+/// Reaches of the band (r) that are tried one after the other at the first frame, around vertices that have not found the surface.
 const TRIES: [f64; 2] = [5.0, REACH[1]];
 
 /// The reach covers the distance of this fraction of the vertices, so that a spike does not widen the band everywhere.
-const MOST: f64 = 0.999;
-/// If `MOST` would need a reach above `WIDE` (r), the reach is what `OFTEN` needs, but at least `WIDE`; around the remaining vertices the
-/// band is widened locally.
+const REACHED: f64 = 0.999;
+/// If the fraction `REACHED` would need a reach above `WIDE` (r), the reach is what the fraction `REACHED_IF_WIDE` needs, but at least `WIDE`; around the
+/// remaining vertices the band is widened locally.
 const WIDE: f64 = 2.5;
-const OFTEN: f64 = 0.95;
+const REACHED_IF_WIDE: f64 = 0.95;
 /// Minimum displacement of a vertex by projection (r): anything less is rounding.
 const STILL: f64 = 1e-5;
-/// Share of vertices that must lie near the particles' surface at the first frame.
+/// Minimum fraction of vertices near the particles' surface at the first frame.
 const OVERLAP: f64 = 0.5;
 
 impl Tracker {
     /// Starts to track a mesh as it is at the first frame, in the particles' space.
     ///
     /// # Errors
-    /// Parameters out of range, a mesh or particles that are not valid; a mesh that is not where the particles are; one to be rebuilt that
-    /// is not closed and 2-manifold by index; cancel.
+    /// Parameters out of range; a mesh or particles that are not valid; over half of the vertices far from the particles' surface; a mesh to
+    /// be rebuilt that is not closed and 2-manifold by index; cancel.
     pub fn new(ctx: &Context, params: Params, mesh: &TriMesh, particles: &Particles) -> Result<Self> {
         Ok(Self::begin(ctx, params, mesh, particles)?.0)
     }
@@ -92,11 +92,15 @@ impl Tracker {
             let wider = tracker.deep(&tracker.vertices, farther.unwrap_or_default());
             if wanted <= tracker.reach && covers(&deep, &wider) {
                 tracker.check_overlap(known)?;
-                let Covered { apart, bare, .. } =
-                    ctx.phase("cover", || tracker.cover(ctx, &surface, &feet, (&particles.positions, true)))?;
-                tracker.bare = bare;
+                let Coverage { uncovered_parts, uncovered, .. } = ctx.phase("cover", || {
+                    tracker.coverage(ctx, &surface, &feet, (&particles.positions, true))
+                })?;
+                tracker.never_covered = uncovered;
                 let (lost, triangles) = (tracker.vertices.len() - known, surface.1.count());
-                return Ok((tracker, StepReport { lost, triangles, apart, ..StepReport::default() }));
+                return Ok((
+                    tracker,
+                    StepReport { lost, triangles, uncovered_parts, ..StepReport::default() },
+                ));
             }
             // Measured again with the wider band: later steps use it, and must find the same values.
             if wanted > tracker.reach {
@@ -132,67 +136,82 @@ impl Tracker {
         if to.positions.is_empty() {
             return self.dry_up(ctx, from, dt);
         }
-        let ((next, ahead), phases) = ctx.step(10, || {
+        let ((next, prefetch), phases) = ctx.step(10, || {
             let paths = Paths::between(from, to, dt)?;
             let (carried, parts) = ctx.phase("advect", || self.carried(ctx, &paths))?;
-            let surface = match self.ahead.ready(&to.positions) {
+            let surface = match self.prefetch.ready(&to.positions) {
                 Some(surface) => surface,
                 None => Arc::new(ctx.phase("phi", || self.surface_of(ctx, to))?),
             };
             let distances =
                 ctx.phase("distance", || self.distances(ctx, &surface, self.deep(&carried, 0.0)))?;
-            let (mut next, kinds) = self.placed(ctx, carried, dt, &distances)?;
-            let feet: Vec<Option<DVec3>> = kinds.iter().map(Flag::foot).collect();
-            let mut covered =
-                ctx.phase("cover", || self.cover(ctx, &surface, &feet, (&to.positions, false)))?;
-            covered.bare.iter_mut().zip(&self.bare).for_each(|(now, ever)| *now &= !ever);
-            let is_flagged = |(kind, is_bare): (&Flag, &bool)| kind.foot().is_none() || *is_bare;
-            next.flags = kinds.iter().zip(&covered.bare).map(is_flagged).collect();
-            let counts = self.counts(&kinds, &covered.bare, &paths);
+            let (mut next, projections) = self.projected_mesh(ctx, carried, dt, &distances)?;
+            let feet: Vec<Option<DVec3>> = projections.iter().map(Projection::foot).collect();
+            let mut coverage =
+                ctx.phase("cover", || self.coverage(ctx, &surface, &feet, (&to.positions, false)))?;
+            coverage.uncovered.iter_mut().zip(&self.never_covered).for_each(|(now, ever)| *now &= !ever);
+            let is_flagged = |(projection, is_uncovered): (&Projection, &bool)| {
+                projection.foot().is_none() || *is_uncovered
+            };
+            next.flags = projections.iter().zip(&coverage.uncovered).map(is_flagged).collect();
+            let counts = self.counts(&projections, &coverage.uncovered, &paths);
             next.report = StepReport { parts, triangles: surface.1.count(), ..counts };
-            let mut ahead = Ahead::default();
+            let mut prefetch = Prefetch::default();
             if self.params.rebuild {
-                let change =
-                    || self.changed(ctx, &next, &feet, &covered, (&surface.0, &distances), &to.positions);
-                (next.report.change, ahead) = self.with_next(ctx, change)?;
+                let change = || {
+                    self.changed_mesh(ctx, &next, &feet, &coverage, (&surface.0, &distances), &to.positions)
+                };
+                (next.report.change, prefetch) = self.with_next(ctx, change)?;
             }
-            next.report.apart = covered.apart;
-            let lost = kinds.iter().zip(&self.delta).filter(|(kind, delta)| kind.is_torn(**delta)).count();
-            warn_of_tears(&mut next.report, (lost, kinds.len()), (from, to, dt), self.params.spacing)?;
-            Ok((next, ahead))
+            next.report.uncovered_parts = coverage.uncovered_parts;
+            let lost = projections
+                .iter()
+                .zip(&self.delta)
+                .filter(|(projection, delta)| projection.has_lost_surface(**delta))
+                .count();
+            warn_of_lost_mesh(
+                &mut next.report,
+                (lost, projections.len()),
+                (from, to, dt),
+                self.params.spacing,
+            )?;
+            Ok((next, prefetch))
         })?;
-        self.ahead = ahead;
+        self.prefetch = prefetch;
         Ok(StepReport { phases, ..self.adopt(next) })
     }
 
-    /// The mesh after a step, before it is rebuilt: its carried vertices are projected. Also the result of the projection for each vertex.
-    fn placed(
+    /// The mesh after a step, before it is rebuilt: the carried vertices are projected. Also the result of the projection of each vertex.
+    fn projected_mesh(
         &self,
         ctx: &Context,
         carried: Vec<DVec3>,
         dt: f64,
         distances: &Distances,
-    ) -> Result<(Next, Vec<Flag>)> {
+    ) -> Result<(Next, Vec<Projection>)> {
         let delta = fade(self, &carried, dt);
         // Strain is measured on the carried vertices: on a thin sheet projection moves them much farther than the particles jitter.
         let drifts = self.drift.after(&self.vertices, &carried);
-        let (mut vertices, kinds) =
+        let (mut vertices, projections) =
             ctx.phase("project", || self.projected(ctx, carried, &delta, distances))?;
         if self.params.rebuild {
-            let is_lost: Vec<bool> =
-                kinds.iter().zip(&delta).map(|(kind, delta)| kind.is_torn(*delta)).collect();
+            let is_lost: Vec<bool> = projections
+                .iter()
+                .zip(&delta)
+                .map(|(projection, delta)| projection.has_lost_surface(*delta))
+                .collect();
             gather(&self.vertices, &self.triangles, &is_lost, &mut vertices);
         }
-        Ok((Next { vertices, delta, drifts, ..Next::default() }, kinds))
+        Ok((Next { vertices, delta, drifts, ..Next::default() }, projections))
     }
 
-    /// What a step reports of vertices and particles.
-    fn counts(&self, kinds: &[Flag], bare: &[bool], paths: &Paths) -> StepReport {
-        let count = |kind: Flag| kinds.iter().filter(|other| **other == kind).count();
+    /// The counts of vertices and particles for the report of a step.
+    fn counts(&self, projections: &[Projection], uncovered: &[bool], paths: &Paths) -> StepReport {
+        let count = |projection: Projection| projections.iter().filter(|other| **other == projection).count();
         StepReport {
-            jumped: count(Flag::Jumped),
-            lost: count(Flag::Lost),
-            uncovered: bare.iter().filter(|is| **is).count(),
+            jumped: count(Projection::Jumped),
+            lost: count(Projection::Lost),
+            uncovered: uncovered.iter().filter(|is| **is).count(),
             born: paths.born,
             died: paths.died,
             particle_warning: paths.mismatch.and_then(|mismatch| mismatch.sentence(self.params.spacing)),
@@ -200,12 +219,12 @@ impl Tracker {
         }
     }
 
-    /// Takes over the mesh after a step; returns its report.
+    /// Replaces the mesh by that after a step; returns the report.
     fn adopt(&mut self, next: Next) -> StepReport {
         (self.vertices, self.delta, self.flags) = (next.vertices, next.delta, next.flags);
         self.drift.vertices = next.drifts;
         if let Some(change) = &next.report.change {
-            self.take(change);
+            self.apply_change(change);
         }
         if self.params.rebuild {
             let drifts = std::mem::take(&mut self.drift.vertices);
@@ -216,57 +235,66 @@ impl Tracker {
 
     /// Prefetches the particles of the step after next: while the mesh is rebuilt, their surface is computed on idle threads. The result is
     /// identical.
-    pub fn set_ahead(&mut self, particles: Arc<Particles>) {
-        self.ahead.wanted = Some(particles);
+    pub fn prefetch(&mut self, particles: Arc<Particles>) {
+        self.prefetch.wanted = Some(particles);
     }
 
-    /// Drops the prefetched surface: its step is done elsewhere.
-    pub fn forget_ahead(&mut self) {
-        self.ahead = Ahead::default();
+    /// Drops the prefetched surface, which a clone of the tracker uses.
+    pub fn forget_prefetched(&mut self) {
+        self.prefetch = Prefetch::default();
     }
 
     /// Runs `work`, and computes the surface of the coming particles at the same time.
-    fn with_next<R>(&self, ctx: &Context, work: impl FnOnce() -> Result<R>) -> Result<(R, Ahead)> {
-        let wanted = self.ahead.wanted.clone().filter(|_| ctx.pool().threads() > 1);
+    fn with_next<R>(&self, ctx: &Context, work: impl FnOnce() -> Result<R>) -> Result<(R, Prefetch)> {
+        let wanted = self.prefetch.wanted.clone().filter(|_| ctx.pool().threads() > 1);
         std::thread::scope(|scope| {
             let surface_of = |particles: &Particles| ctx.pool().install(|| self.surface_of(ctx, particles));
             let making = wanted.as_ref().map(|particles| scope.spawn(move || surface_of(particles)));
             let done = work()?;
             let (Some(making), Some(particles)) = (making, &wanted) else {
-                return Ok((done, Ahead::default()));
+                return Ok((done, Prefetch::default()));
             };
             let made = making.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
             // An error here will occur again in that frame's own step, and is reported there.
             let ready = made.ok().map(|surface| (particles.clone(), Arc::new(surface)));
-            Ok((done, Ahead { wanted: None, ready }))
+            Ok((done, Prefetch { wanted: None, ready }))
         })
     }
 
-    /// What the mesh does not cover of the particles' surface: whole uncovered parts, and the vertices beside uncovered positions of other
-    /// parts.
-    fn cover(
+    /// The uncovered part of the particles' surface: whole connected parts, uncovered positions of the others, and the vertices beside these.
+    fn coverage(
         &self,
         ctx: &Context,
         (phi, surface): &(Implicit, Isosurface),
         feet: &[Option<DVec3>],
         (particles, is_first): (&[DVec3], bool),
-    ) -> Result<Covered> {
+    ) -> Result<Coverage> {
         let parts = Parts::new(phi, surface, feet.iter().flatten().map(cell_of).collect());
         ctx.check()?;
         let spacing = 1.0 / self.params.cell;
         let cover = Cover { feet, triangles: &self.triangles, spacing, is_first };
-        let (bare, positions) = cover.beside_bare(ctx, phi, surface, &parts)?;
-        let bubble = if self.params.every { spacing.powi(3) } else { f64::INFINITY };
-        let lacking = match self.params.rebuild {
-            true => parts.lacking(phi, surface, &Wanted { crowd: self.crowd(particles), bubble }),
+        let (uncovered, positions) = cover.beside_uncovered(ctx, phi, surface, &parts)?;
+        let min_bubble = if self.params.every { spacing.powi(3) } else { f64::INFINITY };
+        let missing = match self.params.rebuild {
+            true => parts.missing(
+                phi,
+                surface,
+                &Wanted { particle_count: self.particle_count_test(particles), min_bubble },
+            ),
             false => MissingParts::default(),
         };
-        Ok(Covered { apart: parts.apart(phi, surface), bare, positions, reach: cover.reach(), lacking })
+        Ok(Coverage {
+            uncovered_parts: parts.uncovered(phi, surface),
+            uncovered,
+            positions,
+            reach: cover.reach(),
+            missing,
+        })
     }
 
-    /// Particles at these positions, for the minimum count in each part of the mesh.
-    pub(super) fn crowd<'a>(&self, positions: &'a [DVec3]) -> ParticleCountTest<'a> {
-        ParticleCountTest { positions, spacing: self.params.spacing, least: self.params.min_drop.max(1) }
+    /// The test for the minimum count of particles in each part of the mesh, with particles at these positions.
+    pub(super) fn particle_count_test<'a>(&self, positions: &'a [DVec3]) -> ParticleCountTest<'a> {
+        ParticleCountTest { positions, spacing: self.params.spacing, min_count: self.params.min_drop.max(1) }
     }
 
     pub(super) fn carried(&self, ctx: &Context, paths: &Paths) -> Result<(Vec<DVec3>, usize)> {
@@ -283,10 +311,10 @@ impl Tracker {
     }
 
     fn distances(&self, ctx: &Context, surface: &(Implicit, Isosurface), deep: Deep) -> Result<Distances> {
-        Distances::deeper(ctx, &surface.0, &surface.1, (self.reach / self.params.cell) as f32, deep)
+        Distances::with_deep_blocks(ctx, &surface.0, &surface.1, (self.reach / self.params.cell) as f32, deep)
     }
 
-    /// Required reach of the band everywhere (r): slightly more than the distance of most vertices, plus drift and stencil.
+    /// Required reach of the band everywhere (r): see [`REACHED`] and [`WIDE`].
     fn wanted_reach(&self) -> f64 {
         let mut far: Vec<f32> =
             self.delta.iter().filter(|delta| !delta.is_nan()).map(|delta| delta.abs()).collect();
@@ -298,8 +326,8 @@ impl Tracker {
             let far = *far.select_nth_unstable_by(position, f32::total_cmp).1;
             self.reach_for(f64::from(far) / self.params.spacing)
         };
-        let reach = of(MOST);
-        if reach <= WIDE { reach } else { of(OFTEN).max(WIDE) }
+        let reach = of(REACHED);
+        if reach <= WIDE { reach } else { of(REACHED_IF_WIDE).max(WIDE) }
     }
 
     /// The distance of each vertex from the surface (m), and its foot (cells).
@@ -320,28 +348,28 @@ impl Tracker {
         mut vertices: Vec<DVec3>,
         delta: &[f32],
         distances: &Distances,
-    ) -> Result<(Vec<DVec3>, Vec<Flag>)> {
+    ) -> Result<(Vec<DVec3>, Vec<Projection>)> {
         let Params { spacing, change, .. } = self.params;
         let cell = distances.cell();
         let chunks = vertices.par_chunks_mut(1024).zip(delta.par_chunks(1024));
-        let flags: Vec<Vec<Flag>> = chunks
+        let flags: Vec<Vec<Projection>> = chunks
             .map_init(
                 || Sampler::new(distances),
                 |sampler, (vertices, delta)| {
                     ctx.check()?;
                     let position = |(vertex, delta): (&mut DVec3, &f32)| {
                         let Some(foot) = foot(sampler, *vertex / cell).filter(|_| !delta.is_nan()) else {
-                            return Flag::Lost;
+                            return Projection::Lost;
                         };
                         let to = foot.at(f64::from(*delta) / cell) * cell;
                         let moved = (to - *vertex).norm() / spacing;
                         if moved > change {
-                            return Flag::Jumped;
+                            return Projection::Jumped;
                         }
                         if moved > STILL {
                             *vertex = to;
                         }
-                        Flag::Placed(foot.position)
+                        Projection::Placed(foot.position)
                     };
                     Ok(vertices.iter_mut().zip(delta).map(position).collect())
                 },
@@ -362,21 +390,23 @@ pub(super) struct Next {
     pub report: StepReport,
 }
 
-/// What the mesh covers of the particles' surface, and what it does not.
-pub(super) struct Covered {
-    pub apart: Vec<UncoveredPart>,
-    /// Vertices beside uncovered positions, and these positions (cells).
-    pub bare: Vec<bool>,
+/// The uncovered part of the particles' surface.
+pub(super) struct Coverage {
+    /// Connected parts on which no vertex has its foot.
+    pub uncovered_parts: Vec<UncoveredPart>,
+    /// Whether each vertex is beside an uncovered position of another part.
+    pub uncovered: Vec<bool>,
+    /// These positions (cells).
     pub positions: Vec<DVec3>,
-    /// Maximum distance between such a vertex' foot and such a position (cells).
+    /// Distance between a foot and an uncovered position up to which the vertex is beside it (cells).
     pub reach: f64,
-    /// Uncovered parts that it should cover.
-    pub lacking: MissingParts,
+    /// Uncovered parts that the mesh should cover.
+    pub missing: MissingParts,
 }
 
 /// Result of projecting a vertex.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Flag {
+enum Projection {
     /// It keeps its distance from its foot (cells).
     Placed(DVec3),
     /// It would have been moved too far.
@@ -385,13 +415,13 @@ enum Flag {
     Lost,
 }
 
-impl Flag {
-    /// Whether it has lost the surface, though it had a distance to keep.
-    fn is_torn(&self, delta: f32) -> bool {
+impl Projection {
+    /// Whether a vertex that had a distance to keep has lost the surface.
+    fn has_lost_surface(&self, delta: f32) -> bool {
         *self == Self::Lost && !delta.is_nan()
     }
 
-    /// Its foot (cells); none if it could not be projected.
+    /// The foot of the vertex (cells); none if it could not be projected.
     fn foot(&self) -> Option<DVec3> {
         if let Self::Placed(foot) = self { Some(*foot) } else { None }
     }

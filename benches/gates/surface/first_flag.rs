@@ -51,7 +51,7 @@ fn frames(ctx: &Context, set: &Set) -> (Option<usize>, Option<usize>) {
             change = Some(frame);
         }
         let report = tracker.step(ctx, &from, &to, FRAME).expect("a step");
-        if flag.is_none() && report.flagged() + report.apart.len() > 0 {
+        if flag.is_none() && report.flagged() + report.uncovered_parts.len() > 0 {
             flag = Some(frame);
         }
         if change.is_some() && flag.is_some() {

@@ -21,7 +21,8 @@ pub fn measure() -> [(f64, String); 2] {
     for (shift, solver) in [(0.0, Solver::Sor), (1.0, Solver::Gradients)] {
         let nodes = balls(1, shift);
         let [near, whole] = [REACH, i32::MAX].map(|reach| {
-            let matching = Matching { solver, tolerance: TOLERANCE, reach, most: 5000, omega: None };
+            let matching =
+                Matching { solver, tolerance: TOLERANCE, reach, max_iterations: 5000, omega: None };
             match_topology(&ctx, &nodes, &matching).expect("a matching")
         });
         residual = residual.max(near.residual).max(whole.residual);

@@ -133,7 +133,7 @@ struct Tally {
     /// Rebuilt over flagged cells of each change.
     shares: Vec<f64>,
     /// Changes by how much more than their cells they needed.
-    rungs: [usize; 4],
+    rebuild_levels: [usize; 4],
     /// Percent.
     alive: f64,
     jump: Worst,
@@ -197,7 +197,7 @@ impl Tally {
     /// How much a change rebuilt.
     fn count(&mut self, change: &Change) {
         if change.rebuilt_cells > 0 {
-            self.rungs[change.rung.min(3)] += 1;
+            self.rebuild_levels[change.rebuild_level.min(3)] += 1;
         }
         if change.flagged_cells > 0 {
             self.shares.push(change.rebuilt_cells as f64 / change.flagged_cells as f64);
@@ -271,9 +271,9 @@ impl Tally {
         self.angles.sort_unstable_by(f64::total_cmp);
         let most = self.shares.last().copied().unwrap_or(f64::NAN);
         let of_changes = format!("{} changes, at most {most:.1}; {whole}", self.shares.len());
-        let changes: usize = self.rungs.iter().sum();
-        let [cells, ring, parts, everything] = self.rungs;
-        let rungs = format!(
+        let changes: usize = self.rebuild_levels.iter().sum();
+        let [cells, ring, parts, everything] = self.rebuild_levels;
+        let levels = format!(
             "of {changes} changes {ring} took a ring, {parts} whole parts, {everything} everything; {whole}"
         );
         let percent = |count: usize, all: usize| 100.0 * count as f64 / all as f64;
@@ -295,7 +295,7 @@ impl Tally {
             (OF_ALL[0], self.failures as f64, whole.clone()),
             (OF_ALL[1], quantile(&self.shares, 0.5), of_changes.clone()),
             (OF_ALL[2], quantile(&self.shares, 0.99), of_changes),
-            (OF_ALL[3], percent(changes - cells, changes), rungs),
+            (OF_ALL[3], percent(changes - cells, changes), levels),
             (OF_LATTICE[0], self.depth.value(), self.depth.note()),
             (OF_LATTICE[1], self.astray.value(), self.astray.note()),
             (OF_CACHES[0], percent(kept, deep), outside),

@@ -74,7 +74,7 @@ fn rebuilding(h: &mut Harness) {
                 of_phases(&reports),
                 100.0 * change.flagged_cells as f64 / all as f64,
                 change.rebuilt_cells,
-                change.rung,
+                change.rebuild_level,
                 100.0 * (triangles - whole) as f64 / triangles as f64,
                 change.made_triangles()
             );

@@ -53,7 +53,7 @@ fields_of!(Prepared => frz_repair_report {
 impl From<RepairReport> for frz_repair_report {
     fn from(report: RepairReport) -> Self {
         Self {
-            rung: report.rung as u32,
+            rung: report.rebuild_level as u32,
             flagged_cells: report.flagged_cells as u64,
             rebuilt_cells: report.rebuilt_cells as u64,
             kept_triangles: report.kept_triangles as u64,

@@ -245,7 +245,7 @@ pub unsafe extern "C" fn frz_tracker_ahead(
     guard(|| unsafe {
         let mut follower = change(tracker)?;
         let particles = self::particles(particles)?;
-        follower.tracker.set_ahead(std::sync::Arc::new(particles));
+        follower.tracker.prefetch(std::sync::Arc::new(particles));
         Ok(())
     })
 }
@@ -288,15 +288,15 @@ pub unsafe extern "C" fn frz_tracker_step(
             };
             follower.saved.take();
             done.new_warnings(&mut follower.has_warned).for_each(|warning| ctx.warn(warning));
-            let drops = done.apart.iter().filter(|apart| apart.volume >= 0.0).count();
-            let bubbles = done.apart.len() - drops;
+            let drops = done.uncovered_parts.iter().filter(|part| part.volume >= 0.0).count();
+            let bubbles = done.uncovered_parts.len() - drops;
             let change = done.change.take();
             let of_change = |count: fn(&Change) -> usize| change.as_ref().map_or(0, count) as u64;
             let report = frz_tracker_report {
                 drops: drops as u64,
                 bubbles: bubbles as u64,
                 changed: u32::from(change.is_some()),
-                rung: of_change(|change| change.rung) as u32,
+                rung: of_change(|change| change.rebuild_level) as u32,
                 changed_cells: of_change(|change| change.flagged_cells),
                 rebuilt_cells: of_change(|change| change.rebuilt_cells),
                 made_triangles: of_change(Change::made_triangles),

@@ -253,7 +253,7 @@ fn report(mesh: &TriMesh, repaired: &Repaired, cell: Cell) -> Value {
         "cell_m": report.cell,
         "flagged_cells": report.flagged_cells,
         "rebuilt_cells": report.rebuilt_cells,
-        "rung": report.rung,
+        "rung": report.rebuild_level,
         "triangles_before": mesh.triangles.len(),
         "kept_triangles": report.kept_triangles,
         "made_triangles": after.triangles.len() - report.kept_triangles,
@@ -286,7 +286,7 @@ const DONE: [[&str; 2]; 5] = [
 ];
 
 /// How far rebuilding extended beyond the faulty cells and those that they require.
-const RUNGS: [&str; 4] = [
+const REBUILD_LEVELS: [&str; 4] = [
     "",
     ", with a ring around",
     ", with all of the parts that they touch",
@@ -311,9 +311,9 @@ fn in_words(from: &Path, to: &Path, before: &TriMesh, repaired: &Repaired, cell:
     }
     let (used, Cell { edge, why }) = (report.cell, cell);
     let why = if used < edge { format!(": {edge} m would have left nothing") } else { why.to_string() };
-    let rung = RUNGS.get(report.rung).copied().unwrap_or_default();
+    let extent = REBUILD_LEVELS.get(report.rebuild_level).copied().unwrap_or_default();
     out += &format!(
-        "  cells of {used} m{why}\n  {:>8} {} flagged, {} rebuilt{rung}\n",
+        "  cells of {used} m{why}\n  {:>8} {} flagged, {} rebuilt{extent}\n",
         report.flagged_cells,
         form(report.flagged_cells, ["cell", "cells"]),
         report.rebuilt_cells

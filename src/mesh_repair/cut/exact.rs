@@ -79,7 +79,7 @@ fn is_beyond(p: Fixed, q: Fixed, (a, n): (usize, i32), (b, m): (usize, i32)) -> 
     let mut node = [0; 3];
     (node[a], node[b]) = (n, m);
     let is_left = passes_left(axis, p, q, axis.line(node));
-    let [along_p, along_q, _] = [0, 1, 2].map(|i| axis.turned(q)[i] - axis.turned(p)[i]);
+    let [along_p, along_q, _] = [0, 1, 2].map(|i| axis.rotated(q)[i] - axis.rotated(p)[i]);
     // Which world axis the first rotated axis is, and whether it points the opposite way.
     let (first, is_against) = match axis {
         Axis::Z => (0, false),

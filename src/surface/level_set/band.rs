@@ -51,14 +51,14 @@ impl Distances {
     /// # Errors
     /// More memory than the context allows; cancel.
     pub fn new(ctx: &Context, phi: &Implicit, surface: &Isosurface, reach: f32) -> Result<Self> {
-        Self::deeper(ctx, phi, surface, reach, Vec::new())
+        Self::with_deep_blocks(ctx, phi, surface, reach, Vec::new())
     }
 
     /// Distances up to `reach` (cells) from a surface, and farther in some blocks, ascending, each with its reach (cells).
     ///
     /// # Errors
     /// As [`Distances::new`].
-    pub fn deeper(
+    pub fn with_deep_blocks(
         ctx: &Context,
         phi: &Implicit,
         surface: &Isosurface,
@@ -177,14 +177,14 @@ fn distances(
     block: Coord,
     triangles: &[Triangle],
     reach: f32,
-    memory: &mut Search,
+    scratch: &mut Search,
 ) -> Option<Box<Values>> {
     if triangles.is_empty() {
         return None;
     }
     let mut out = Box::new([reach; VOXELS]);
     let mut is_found = false;
-    search(triangles, reach, &ALL, memory, |group| {
+    search(triangles, reach, &ALL, scratch, |group| {
         for lane in 0..LANES {
             let distance = group.squared[lane].sqrt();
             is_found |= distance < reach;

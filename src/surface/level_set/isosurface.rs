@@ -101,9 +101,9 @@ impl Isosurface {
         let mut positions = Vec::with_capacity(self.positions.len());
         for (patch, ends) in phi.patches().iter().zip(self.first.windows(2)) {
             let corner = DVec3::from(patch.map(|at| f64::from(at * SIDE)));
-            let places = &self.positions[ends[0] as usize..ends[1] as usize];
+            let offsets = &self.positions[ends[0] as usize..ends[1] as usize];
             positions
-                .extend(places.iter().map(|at| ((corner + DVec3::from(at.map(f64::from))) * cell).cast()));
+                .extend(offsets.iter().map(|at| ((corner + DVec3::from(at.map(f64::from))) * cell).cast()));
         }
         TriMesh { positions, triangles: self.triangles.clone() }
     }

@@ -91,7 +91,7 @@ fn value(sums: &Sums, lane: usize, spacing: f64) -> f64 {
         (rate[(a, b)], rate[(b, a)]) = (entry, entry);
     }
     let (offset, away) = spread(sums, lane, radius).offset(mean.into(), spacing);
-    away - offset.min(spacing * share(&rate))
+    away - offset.min(spacing * damping(&rate))
 }
 
 /// The spread of the particles around a node.
@@ -108,22 +108,22 @@ fn spread(sums: &Sums, lane: usize, radius: f64) -> Spread {
 }
 
 /// The factor f for a rate at which the mean moves.
-fn share(rate: &Matrix3<f64>) -> f64 {
+fn damping(rate: &Matrix3<f64>) -> f64 {
     let [low, high] = RATES;
     // This norm bounds all eigenvalues.
     if rate.norm_squared() < low * low {
         return 1.0;
     }
-    let most = greatest_eigenvalue(rate);
-    if most < low {
+    let max_rate = max_eigenvalue(rate);
+    if max_rate < low {
         return 1.0;
     }
-    let g = ((high - most) / (high - low)).clamp(0.0, 1.0);
+    let g = ((high - max_rate) / (high - low)).clamp(0.0, 1.0);
     g * (3.0 + g * (g - 3.0))
 }
 
 /// Largest eigenvalue of a symmetric matrix, in closed form (Smith 1961).
-fn greatest_eigenvalue(m: &Matrix3<f64>) -> f64 {
+fn max_eigenvalue(m: &Matrix3<f64>) -> f64 {
     let mean = m.trace() / 3.0;
     let rest = m - Matrix3::from_diagonal_element(mean);
     let size = (rest.norm_squared() / 6.0).sqrt();
@@ -145,9 +145,9 @@ mod tests {
             let [a, b, c, d, e, f] = [0, 1, 2, 3, 4, 5].map(entry);
             let m = Matrix3::new(a, b, c, b, d, e, c, e, f);
             let expected = m.symmetric_eigenvalues().max();
-            assert!((greatest_eigenvalue(&m) - expected).abs() < 1e-9);
+            assert!((max_eigenvalue(&m) - expected).abs() < 1e-9);
         }
-        assert_eq!(greatest_eigenvalue(&Matrix3::identity()), 1.0);
+        assert_eq!(max_eigenvalue(&Matrix3::identity()), 1.0);
     }
 
     #[test]

@@ -15,9 +15,9 @@ use crate::vdb::level_set::from_particles;
 /// Half width of the narrow band (cells).
 pub const HALF_WIDTH: f32 = 3.0;
 /// Minimum radius (cells): OpenVDB leaves smaller spheres out, as they may lie between nodes.
-const LEAST: f64 = 1.5;
+const MIN_RADIUS: f64 = 1.5;
 /// Maximum radius (cells): the inside of each sphere is filled node by node.
-const MOST: f64 = 100.0;
+const MAX_RADIUS: f64 = 100.0;
 /// Tolerance for rounding: OpenVDB takes radii of 32 bits.
 const ROUNDING: f64 = 1e-6;
 /// Farthest node from the origin, on each axis.
@@ -50,7 +50,7 @@ pub fn level_set(ctx: &Context, distances: &Distances) -> Result<FloatGrid> {
 
 /// Whether spheres of a radius (m) can be made on cells of an edge (m): 1.5 to 100 cells are allowed.
 pub fn is_sphere_radius(radius: f64, cell: f64) -> bool {
-    (LEAST * (1.0 - ROUNDING)..=MOST).contains(&(radius / cell))
+    (MIN_RADIUS * (1.0 - ROUNDING)..=MAX_RADIUS).contains(&(radius / cell))
 }
 
 /// Level set (m) of the union of spheres of a radius (m) around positions (m), on cells of `cell` (m), with a band of three cells on each
@@ -73,8 +73,8 @@ pub fn spheres(ctx: &Context, positions: &[DVec3], radius: f64, cell: f64) -> Re
             far + 1
         )));
     }
-    ctx.allow(WHAT, most_blocks(positions, cells + f64::from(HALF_WIDTH), cell).saturating_mul(BYTES))?;
-    let radius = radius.max(LEAST * cell * (1.0 + ROUNDING)) as f32;
+    ctx.allow(WHAT, max_blocks(positions, cells + f64::from(HALF_WIDTH), cell).saturating_mul(BYTES))?;
+    let radius = radius.max(MIN_RADIUS * cell * (1.0 + ROUNDING)) as f32;
     let mut grid = from_particles(ctx, positions, &vec![radius; positions.len()], cell, HALF_WIDTH)?;
     grid.set_name("surface")?;
     Ok(grid)
@@ -82,7 +82,7 @@ pub fn spheres(ctx: &Context, positions: &[DVec3], radius: f64, cell: f64) -> Re
 
 /// Upper bound on the count of blocks within `reach` (cells) of positions (m): counts cubes of whole blocks at least that long, and those
 /// beside them.
-fn most_blocks(positions: &[DVec3], reach: f64, cell: f64) -> u64 {
+fn max_blocks(positions: &[DVec3], reach: f64, cell: f64) -> u64 {
     let blocks = (reach / DIM as f64).ceil();
     let edge = blocks * DIM as f64 * cell;
     let mut cubes: Vec<Coord> = positions.par_iter().map(|position| cell_of(&(position / edge))).collect();

@@ -20,9 +20,9 @@ const SHRINK: f64 = 0.63;
 /// The step back: mu, from 1 / lambda + 1 / mu = k_PB.
 const GROW: f64 = 1.0 / (PASS_BAND - 1.0 / SHRINK);
 /// Largest factor by which a pass may rescale a part; one that would need more is degenerate.
-const MOST: f64 = 4.0;
+const MAX_SCALE: f64 = 4.0;
 /// How far a part may reach from its centre, relative to its initial reach.
-const FARTHEST: f64 = 1.1;
+const MAX_REACH: f64 = 1.1;
 /// Vertices of a task.
 const PIECE: usize = 1024;
 
@@ -45,7 +45,7 @@ pub fn smooth(ctx: &Context, mesh: &mut TriMesh, passes: u32) -> Result<()> {
         let mut next = moved(&rings, &moved(&rings, &positions, SHRINK), GROW);
         parts.restore(&mut next, &mesh.triangles, &volumes);
         for (is_done, (now, first)) in is_done.iter_mut().zip(parts.reaches(&next).iter().zip(&reaches)) {
-            *is_done |= *now > FARTHEST * first;
+            *is_done |= *now > MAX_REACH * first;
         }
         parts.take(&mut positions, &next, &is_done);
     }
@@ -132,7 +132,7 @@ impl Parts {
         let now = self.volumes(positions, triangles, &centres);
         let scale = |(before, now): (&f64, &f64)| {
             let scale = libm::cbrt(before / now);
-            if (1.0 / MOST..=MOST).contains(&scale) { scale } else { 1.0 }
+            if (1.0 / MAX_SCALE..=MAX_SCALE).contains(&scale) { scale } else { 1.0 }
         };
         let scales: Vec<f64> = volumes.iter().zip(&now).map(scale).collect();
         for (position, &part) in positions.iter_mut().zip(&self.of) {

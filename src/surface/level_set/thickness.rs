@@ -14,7 +14,7 @@ use super::SUPPORT;
 
 /// Minimum distance of a surface from a sheet's middle (cells). Nodes inside a sheet must be neighbours along edges of the grid, or marching
 /// cubes break it up: whatever its orientation, its sides must be apart by the diagonal of a cell's face.
-const LEAST: f64 = std::f64::consts::FRAC_1_SQRT_2;
+const MIN_DISTANCE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Sums over the particles around a node, weighted by q^2; lengths are in cells.
 #[derive(Debug)]
@@ -36,14 +36,14 @@ impl Spread {
             return thick;
         }
         let SymmetricEigen { eigenvalues: variances, eigenvectors: axes } = self.covariance.symmetric_eigen();
-        let least = variances.imin();
-        let [a, b] = [1, 2].map(|next| variances[(least + next) % 3]);
+        let thinnest = variances.imin();
+        let [a, b] = [1, 2].map(|next| variances[(thinnest + next) % 3]);
         let thickness = self.thickness(mean, spacing, a, b);
         let halves = variances.map(|variance| {
             let width = thickness.max((12.0 * variance.max(0.0)).sqrt());
-            (0.5 * width).max(LEAST).min(spacing)
+            (0.5 * width).max(MIN_DISTANCE).min(spacing)
         });
-        let half = halves[least];
+        let half = halves[thinnest];
         if half >= spacing {
             return thick;
         }
@@ -73,8 +73,8 @@ impl Spread {
         let square = (SUPPORT * spacing).powi(2);
         let q = 1.0 - mean.norm_squared() / square;
         // At least that of one particle's cube.
-        let own = spacing * spacing / 12.0;
-        let filled = (a.max(own) * b.max(own)).sqrt() / (square * q / 8.0);
+        let min_variance = spacing * spacing / 12.0;
+        let filled = (a.max(min_variance) * b.max(min_variance)).sqrt() / (square * q / 8.0);
         let area = std::f64::consts::PI * square * q.powi(3) / 3.0;
         self.weight * spacing.powi(3) / (area * filled)
     }
@@ -122,7 +122,7 @@ mod tests {
         let (spread, mean) = in_half_spacings(seen(positions));
         let (offset, _) = spread.offset(mean, 2.0);
         // In cells of half a spacing.
-        offset / f64::max(thick, LEAST)
+        offset / f64::max(thick, MIN_DISTANCE)
     }
 
     #[test]

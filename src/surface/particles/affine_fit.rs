@@ -12,28 +12,28 @@ const FLAT: f64 = 0.004;
 #[derive(Default)]
 pub struct Near {
     position: [Vec<[f32; LANES]>; 3],
-    way: [Vec<[f32; LANES]>; 3],
+    displacement: [Vec<[f32; LANES]>; 3],
     count: usize,
 }
 
 impl Near {
     pub fn clear(&mut self) {
-        self.position.iter_mut().chain(&mut self.way).for_each(Vec::clear);
+        self.position.iter_mut().chain(&mut self.displacement).for_each(Vec::clear);
         self.count = 0;
     }
 
     #[inline(always)]
-    pub fn push(&mut self, position: [f32; 3], way: [f32; 3]) {
+    pub fn push(&mut self, position: [f32; 3], displacement: [f32; 3]) {
         let lane = self.count % LANES;
         if lane == 0 {
             // Padding lies too far away to count.
             self.position.iter_mut().for_each(|lanes| lanes.push([1.0e6; LANES]));
-            self.way.iter_mut().for_each(|lanes| lanes.push([0.0; LANES]));
+            self.displacement.iter_mut().for_each(|lanes| lanes.push([0.0; LANES]));
         }
         let last = self.count / LANES;
         for axis in 0..3 {
             self.position[axis][last][lane] = position[axis];
-            self.way[axis][last][lane] = way[axis];
+            self.displacement[axis][last][lane] = displacement[axis];
         }
         self.count += 1;
     }
@@ -50,16 +50,16 @@ pub struct Sums {
 
 /// Sums over the particles within a radius (spacings) of a position, with the weights (1 - (d / radius)^2)^3 (poly6: Müller, Charypar and
 /// Gross 2003); none if there are no particles.
-pub fn sums(near: &Near, room: &mut Near, at: [f32; 3], radius: f32) -> Option<Sums> {
-    dispatch!(sums_body(near: &Near, room: &mut Near, at: [f32; 3], radius: f32) -> Option<Sums>)
+pub fn sums(near: &Near, in_radius: &mut Near, at: [f32; 3], radius: f32) -> Option<Sums> {
+    dispatch!(sums_body(near: &Near, in_radius: &mut Near, at: [f32; 3], radius: f32) -> Option<Sums>)
 }
 
 #[inline(always)]
-fn sums_body(near: &Near, room: &mut Near, at: [f32; 3], radius: f32) -> Option<Sums> {
+fn sums_body(near: &Near, in_radius: &mut Near, at: [f32; 3], radius: f32) -> Option<Sums> {
     let zero = Lanes::all(0.0);
     let centre = [Lanes::all(at[0]), Lanes::all(at[1]), Lanes::all(at[2])];
-    let most = Lanes::all(radius * radius);
-    room.clear();
+    let max_square = Lanes::all(radius * radius);
+    in_radius.clear();
     for chunk in 0..near.position[0].len() {
         let d = [
             Lanes(near.position[0][chunk]) - centre[0],
@@ -67,25 +67,36 @@ fn sums_body(near: &Near, room: &mut Near, at: [f32; 3], radius: f32) -> Option<
             Lanes(near.position[2][chunk]) - centre[2],
         ];
         let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-        let mut bits = square.is_less(most).bits();
+        let mut bits = square.is_less(max_square).bits();
         if bits == 0 {
             continue;
         }
-        let way = [near.way[0][chunk], near.way[1][chunk], near.way[2][chunk]];
+        let displacement =
+            [near.displacement[0][chunk], near.displacement[1][chunk], near.displacement[2][chunk]];
         while bits != 0 {
             let lane = bits.trailing_zeros() as usize & (LANES - 1);
             bits &= bits - 1;
-            room.push([d[0].0[lane], d[1].0[lane], d[2].0[lane]], [way[0][lane], way[1][lane], way[2][lane]]);
+            in_radius.push(
+                [d[0].0[lane], d[1].0[lane], d[2].0[lane]],
+                [displacement[0][lane], displacement[1][lane], displacement[2][lane]],
+            );
         }
     }
     let (one, inverse) = (Lanes::all(1.0), Lanes::all(1.0 / (radius * radius)));
     let mut all = zero;
     let (mut sum_d, mut sum_u) = ([zero; 3], [zero; 3]);
     let (mut sum_dd, mut sum_ud) = ([[zero; 3]; 3], [[zero; 3]; 3]);
-    for chunk in 0..room.position[0].len() {
-        let d =
-            [Lanes(room.position[0][chunk]), Lanes(room.position[1][chunk]), Lanes(room.position[2][chunk])];
-        let u = [Lanes(room.way[0][chunk]), Lanes(room.way[1][chunk]), Lanes(room.way[2][chunk])];
+    for chunk in 0..in_radius.position[0].len() {
+        let d = [
+            Lanes(in_radius.position[0][chunk]),
+            Lanes(in_radius.position[1][chunk]),
+            Lanes(in_radius.position[2][chunk]),
+        ];
+        let u = [
+            Lanes(in_radius.displacement[0][chunk]),
+            Lanes(in_radius.displacement[1][chunk]),
+            Lanes(in_radius.displacement[2][chunk]),
+        ];
         let q = (one - (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) * inverse).max(zero);
         let weight = q * q * q;
         all = all + weight;
@@ -114,19 +125,19 @@ fn sums_body(near: &Near, room: &mut Near, at: [f32; 3], radius: f32) -> Option<
 
 /// An affine map from positions relative to where it was fitted (spacings) to displacements (spacings).
 #[derive(Debug, Clone, Copy)]
-pub struct Map {
+pub struct AffineMap {
     /// Sum of the weights of the particles that it was fitted to.
     pub weight: f64,
     /// The displacement at the fitted position itself.
-    way: Vector3<f64>,
+    displacement: Vector3<f64>,
     /// Gradient of the displacement.
-    change: Matrix3<f64>,
+    gradient: Matrix3<f64>,
 }
 
-impl Map {
+impl AffineMap {
     /// The displacement at a position relative to where the map was fitted.
     pub fn at(&self, position: Vector3<f64>) -> Vector3<f64> {
-        self.way + self.change * position
+        self.displacement + self.gradient * position
     }
 }
 
@@ -137,14 +148,14 @@ impl Sums {
     }
 
     /// The best-fitting affine map.
-    pub fn map(&self) -> Map {
+    pub fn map(&self) -> AffineMap {
         let (d, u) = (self.d / self.weight, self.u / self.weight);
         let spread = self.dd / self.weight - d * d.transpose();
         let joint = self.ud / self.weight - u * d.transpose();
         // It is u + joint spread^-1 (x - d). In directions in which positions hardly spread it is constant.
-        let least = FLAT * spread.trace();
-        let damped = spread * spread + Matrix3::from_diagonal_element(least * least);
-        let change = damped.try_inverse().map_or_else(Matrix3::zeros, |inverse| joint * spread * inverse);
-        Map { weight: self.weight, way: u - change * d, change }
+        let min_spread = FLAT * spread.trace();
+        let damped = spread * spread + Matrix3::from_diagonal_element(min_spread * min_spread);
+        let gradient = damped.try_inverse().map_or_else(Matrix3::zeros, |inverse| joint * spread * inverse);
+        AffineMap { weight: self.weight, displacement: u - gradient * d, gradient }
     }
 }

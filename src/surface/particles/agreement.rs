@@ -14,7 +14,7 @@ use crate::surface::report::StepReport;
 const SAMPLES: usize = 2000;
 /// Neighbouring particles whose median relative displacement in a frame is over this (spacings) are not the same ones: in a splashing dam
 /// break it is 0.2.
-const TORN: f64 = 1.0;
+const TOO_FAR_APART: f64 = 1.0;
 /// Distance (spacings) up to which particles are neighbours.
 const BESIDE: f64 = 1.5;
 /// Share of particles without another where their velocities take them, from which on velocities are wrong.
@@ -42,9 +42,9 @@ pub fn disagreement(from: &Particles, to: &Particles, dt: f64, spacing: f64) -> 
     if from.ids.is_empty() || to.ids.is_empty() {
         return Ok(velocities_miss(from, to, dt, spacing));
     }
-    Ok(torn(&paths, spacing).filter(|apart| *apart > TORN).map(|apart| {
+    Ok(median_separation(&paths, spacing).filter(|separation| *separation > TOO_FAR_APART).map(|separation| {
         format!(
-            "by their ids, particles beside each other go {apart:.2} spacings apart in a frame, in the median: are ids row numbers, \
+            "by their ids, particles beside each other go {separation:.2} spacings apart in a frame, in the median: are ids row numbers, \
              which name other particles in each frame?"
         )
     }))
@@ -55,7 +55,7 @@ pub fn disagreement(from: &Particles, to: &Particles, dt: f64, spacing: f64) -> 
 ///
 /// # Errors
 /// As [`disagreement`].
-pub(in crate::surface) fn warn_of_tears(
+pub(in crate::surface) fn warn_of_lost_mesh(
     report: &mut StepReport,
     (lost, all): (usize, usize),
     (from, to, dt): (&Particles, &Particles, f64),
@@ -79,7 +79,7 @@ pub(in crate::surface) fn warn_of_tears(
 }
 
 /// Median relative displacement (spacings) of neighbouring particles.
-fn torn(paths: &Paths, spacing: f64) -> Option<f64> {
+fn median_separation(paths: &Paths, spacing: f64) -> Option<f64> {
     let (mut from, mut to) = (Vec::new(), Vec::new());
     paths.at(0.0, &mut from);
     paths.at(1.0, &mut to);
@@ -93,7 +93,7 @@ fn torn(paths: &Paths, spacing: f64) -> Option<f64> {
             list.push(at);
         }
     }
-    let apart = |at: usize| {
+    let separation = |at: usize| {
         let others = around(bin(&from[at])).into_iter().filter_map(|cell| near.get(&cell)).flatten();
         let beside = others
             .filter(|other| **other != at)
@@ -102,7 +102,7 @@ fn torn(paths: &Paths, spacing: f64) -> Option<f64> {
             .filter(|(distance, _)| *distance <= edge)?;
         Some(((to[at] - from[at]) - (to[beside.1] - from[beside.1])).norm() / spacing)
     };
-    let mut all: Vec<f64> = sampled.filter_map(apart).collect();
+    let mut all: Vec<f64> = sampled.filter_map(separation).collect();
     if all.is_empty() {
         return None;
     }

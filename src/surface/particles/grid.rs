@@ -69,7 +69,7 @@ impl Cells {
                 )));
             }
         }
-        let least = low.map(|x| x as i32);
+        let low_cell = low.map(|x| x as i32);
         let item = |(position, index): (&DVec3, u32)| {
             let cell = cell_of(position);
             let part = |axis: usize| ((position[axis] / edge - cell[axis]) as f32).clamp(0.0, 1.0);
@@ -79,11 +79,11 @@ impl Cells {
         };
         let mut items: Vec<Item> =
             positions.par_iter().zip(0..positions.len() as u32).with_min_len(4096).map(item).collect();
-        let tell = |a: &Item, b: &Item| {
+        let compare = |a: &Item, b: &Item| {
             a.key.cmp(&b.key).then(a.offset.cmp(&b.offset)).then_with(|| rank(a.index).cmp(&rank(b.index)))
         };
-        items.par_sort_unstable_by(tell);
-        let mut cells = Self { edge, low: least, ..Self::default() };
+        items.par_sort_unstable_by(compare);
+        let mut cells = Self { edge, low: low_cell, ..Self::default() };
         for (n, item) in items.iter().enumerate() {
             if cells.keys.last() != Some(&item.key) {
                 cells.keys.push(item.key);
@@ -189,8 +189,8 @@ mod tests {
         let positions: Vec<DVec3> = (0..200)
             .map(|n| DVec3::new((n * 37 % 50) as f64, (n * 13 % 40) as f64 - 20.0, (n % 30) as f64) * 0.1)
             .collect();
-        let mut turned = positions.clone();
-        turned.reverse();
+        let mut reversed = positions.clone();
+        reversed.reverse();
         let near = |positions: &[DVec3]| {
             let cells = Cells::new(positions, 0.7, |_| 0).unwrap();
             let mut found = Vec::new();
@@ -198,7 +198,7 @@ mod tests {
             found
         };
         let found = near(&positions);
-        assert_eq!(found, near(&turned));
+        assert_eq!(found, near(&reversed));
         let is_in = |p: &&DVec3| {
             let cell = [0, 1, 2].map(|axis| (p[axis] / 0.7).floor() as i32);
             (1..=3).contains(&cell[0]) && (-2..=0).contains(&cell[1]) && (0..=2).contains(&cell[2])

@@ -17,11 +17,11 @@ pub struct Paths {
     from: Vec<DVec3>,
     to: Vec<DVec3>,
     /// Velocities times the time between the frames (m), at both ends; none: paths are lines.
-    speeds: Vec<[DVec3; 2]>,
+    tangents: Vec<[DVec3; 2]>,
     /// Order of particles at the same position.
     ranks: Vec<i64>,
     /// How velocities disagree with positions, if they do: they are then ignored.
-    pub mismatch: Option<Mismatch>,
+    pub mismatch: Option<VelocityMismatch>,
     /// Count of particles of the first frame that end, and of the second that are new.
     pub died: usize,
     /// See `died`.
@@ -55,8 +55,8 @@ impl Paths {
         };
         let (old, new) = (sorted(&from.ids), sorted(&to.ids));
         let mut out = Self::default();
-        let has_speeds = !from.velocities.is_empty() && !to.velocities.is_empty();
-        let speed =
+        let has_velocities = !from.velocities.is_empty() && !to.velocities.is_empty();
+        let tangent =
             |frame: &Particles, at: u32| DVec3::from(frame.velocities[at as usize].map(f64::from)) * dt;
         let mut next = 0;
         for (id, at) in old {
@@ -70,14 +70,14 @@ impl Paths {
             out.from.push(from.positions[at as usize]);
             out.to.push(to.positions[*then as usize]);
             out.ranks.push(id);
-            if has_speeds {
-                out.speeds.push([speed(from, at), speed(to, *then)]);
+            if has_velocities {
+                out.tangents.push([tangent(from, at), tangent(to, *then)]);
             }
         }
         out.born = to.positions.len() - out.from.len();
-        out.mismatch = out.mismatched();
+        out.mismatch = out.find_mismatch();
         if out.mismatch.is_some() {
-            out.speeds.clear();
+            out.tangents.clear();
         }
         Ok(out)
     }
@@ -88,32 +88,37 @@ impl Paths {
                 "particles have neither ids in both frames nor velocities: what moves where is not known",
             ));
         }
-        let ways = from.velocities.iter().map(|speed| DVec3::from(speed.map(f64::from)) * dt);
-        let to = from.positions.iter().zip(ways).map(|(position, way)| position + way).collect();
+        let displacements = from.velocities.iter().map(|velocity| DVec3::from(velocity.map(f64::from)) * dt);
+        let to = from
+            .positions
+            .iter()
+            .zip(displacements)
+            .map(|(position, displacement)| position + displacement)
+            .collect();
         let ranks = vec![0; from.positions.len()];
         Ok(Self { from: from.positions.clone(), to, ranks, ..Self::default() })
     }
 
     /// The mismatch if velocities are not in the unit, or not of the time, of the positions.
-    fn mismatched(&self) -> Option<Mismatch> {
-        let speed = |n: usize| (self.speeds[n][0] + self.speeds[n][1]) * 0.5;
-        let way = |n: usize| self.to[n] - self.from[n];
+    fn find_mismatch(&self) -> Option<VelocityMismatch> {
+        let mean_tangent = |n: usize| (self.tangents[n][0] + self.tangents[n][1]) * 0.5;
+        let displacement = |n: usize| self.to[n] - self.from[n];
         let median = |of: &dyn Fn(usize) -> f64| {
-            let mut all: Vec<f64> = (0..self.speeds.len()).map(of).collect();
+            let mut all: Vec<f64> = (0..self.tangents.len()).map(of).collect();
             let middle = all.len() / 2;
             if all.is_empty() { 0.0 } else { *all.select_nth_unstable_by(middle, f64::total_cmp).1 }
         };
-        let apart = median(&|n| (speed(n) - way(n)).norm());
-        let by_ids = median(&|n| way(n).norm());
-        if apart <= TRUSTED * by_ids {
+        let end_distance = median(&|n| (mean_tangent(n) - displacement(n)).norm());
+        let by_ids = median(&|n| displacement(n).norm());
+        if end_distance <= TRUSTED * by_ids {
             return None;
         }
-        let by_velocities = median(&|n| speed(n).norm());
+        let by_velocities = median(&|n| mean_tangent(n).norm());
         let cosine = median(&|n| {
-            let lengths = speed(n).norm() * way(n).norm();
-            if lengths > 0.0 { speed(n).dot(&way(n)) / lengths } else { 0.0 }
+            let lengths = mean_tangent(n).norm() * displacement(n).norm();
+            if lengths > 0.0 { mean_tangent(n).dot(&displacement(n)) / lengths } else { 0.0 }
         });
-        Some(Mismatch { by_ids, by_velocities, apart, cosine })
+        Some(VelocityMismatch { by_ids, by_velocities, end_distance, cosine })
     }
 
     /// Count of paths.
@@ -130,8 +135,8 @@ impl Paths {
     pub fn farthest(&self) -> f64 {
         let each = (0..self.count()).into_par_iter().with_min_len(4096);
         each.map(|n| {
-            let way = (self.to[n] - self.from[n]).norm();
-            self.speeds.get(n).map_or(way, |[a, b]| way.max(a.norm()).max(b.norm()))
+            let displacement = (self.to[n] - self.from[n]).norm();
+            self.tangents.get(n).map_or(displacement, |[a, b]| displacement.max(a.norm()).max(b.norm()))
         })
         .reduce(|| 0.0, f64::max)
     }
@@ -140,7 +145,7 @@ impl Paths {
     pub fn at(&self, share: f64, out: &mut Vec<DVec3>) {
         let position = |n: usize| {
             let (from, to) = (self.from[n], self.to[n]);
-            match self.speeds.get(n) {
+            match self.tangents.get(n) {
                 // The ends are exact.
                 _ if share <= 0.0 => from,
                 _ if share >= 1.0 => to,
@@ -178,18 +183,18 @@ pub fn interpolate(from: &Particles, to: &Particles, dt: f64, share: f64) -> Res
     let row = |frame: &Particles| -> HashMap<i64, usize> { frame.ids.iter().copied().zip(0..).collect() };
     let (old, new) = (row(from), row(to));
     if !from.velocities.is_empty() && !to.velocities.is_empty() {
-        let speed = |id: &i64| {
+        let velocity = |id: &i64| {
             let (a, b) = (from.velocities[old[id]], to.velocities[new[id]]);
             [0, 1, 2].map(|axis| a[axis] + (b[axis] - a[axis]) * share as f32)
         };
-        out.velocities = paths.ranks.iter().map(speed).collect();
+        out.velocities = paths.ranks.iter().map(velocity).collect();
     }
     for (row, id) in from.ids.iter().enumerate().filter(|(_, id)| !new.contains_key(id)) {
-        let speed = from.velocities.get(row).copied().unwrap_or_default();
-        out.positions.push(from.positions[row] + DVec3::from(speed.map(f64::from)) * (dt * share));
+        let velocity = from.velocities.get(row).copied().unwrap_or_default();
+        out.positions.push(from.positions[row] + DVec3::from(velocity.map(f64::from)) * (dt * share));
         out.ids.push(*id);
         if !out.velocities.is_empty() {
-            out.velocities.push(speed);
+            out.velocities.push(velocity);
         }
     }
     Ok(out)
@@ -197,18 +202,18 @@ pub fn interpolate(from: &Particles, to: &Particles, dt: f64, share: f64) -> Res
 
 /// Displacements of the particles of a frame by their ids and by their velocities (m, medians over the particles).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Mismatch {
+pub struct VelocityMismatch {
     /// Length of the displacements by ids.
     pub by_ids: f64,
     /// Length of the displacements by velocities.
     pub by_velocities: f64,
     /// Distance between their end points.
-    pub apart: f64,
+    pub end_distance: f64,
     /// Cosine of the angle between both.
     pub cosine: f64,
 }
 
-impl Mismatch {
+impl VelocityMismatch {
     /// Displacements shorter than this (spacings) are jitter of particles at rest.
     const STILL: f64 = 0.5;
     /// Minimum cosine at which both have the same direction.
@@ -216,7 +221,7 @@ impl Mismatch {
 
     /// A warning for particles of a spacing (m); none if both agree closely enough.
     pub fn sentence(&self, spacing: f64) -> Option<String> {
-        if self.apart <= Self::STILL * spacing {
+        if self.end_distance <= Self::STILL * spacing {
             return None;
         }
         let [ids, velocities] = [self.by_ids, self.by_velocities].map(|length| length / spacing);

@@ -97,13 +97,13 @@ impl Rest {
         change: &Change,
     ) -> Result<Vec<Option<DVec3>>> {
         let made = change.triangles.iter().zip(&change.sources).filter(|(_, from)| **from == Source::New);
-        let mut names: Vec<u32> = made.flat_map(|(names, _)| *names).collect();
-        names.sort_unstable();
-        names.dedup();
-        let at: Vec<DVec3> = names.iter().map(|name| change.vertices[*name as usize]).collect();
+        let mut vertices: Vec<u32> = made.flat_map(|(corners, _)| *corners).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        let at: Vec<DVec3> = vertices.iter().map(|vertex| change.vertices[*vertex as usize]).collect();
         let mut out = vec![None; change.vertices.len()];
-        for (name, position) in names.into_iter().zip(self.positions(ctx, now, spacing, &at)?) {
-            out[name as usize] = position;
+        for (vertex, position) in vertices.into_iter().zip(self.positions(ctx, now, spacing, &at)?) {
+            out[vertex as usize] = position;
         }
         Ok(out)
     }
@@ -126,7 +126,7 @@ impl Tracker {
 
 /// A particle near a position.
 #[derive(Clone, Copy)]
-struct Seen {
+struct Neighbour {
     /// From the corner of the position's cell (cells).
     offset: [f32; 3],
     /// Where it is, and was at the first frame (m).
@@ -134,15 +134,15 @@ struct Seen {
     first: DVec3,
     weight: f64,
     /// The particle that represents its origin.
-    head: Option<usize>,
+    representative: Option<usize>,
 }
 
 /// Scratch buffers of a task.
 #[derive(Default)]
 struct Scratch {
-    seen: Vec<Seen>,
+    neighbours: Vec<Neighbour>,
     near: Near,
-    room: Near,
+    in_radius: Near,
 }
 
 /// The particles near some positions.
@@ -177,15 +177,15 @@ impl Field {
         let edge = self.cells.edge();
         let cell = [0, 1, 2].map(|axis| (position[axis] / edge).floor().clamp(-LIMIT, LIMIT) as i32);
         let from = position / edge - DVec3::from(cell.map(f64::from));
-        let is_there = |doubling: &u32| self.gather(cell, from, RINGS << *doubling, &mut scratch.seen);
+        let is_there = |doubling: &u32| self.gather(cell, from, RINGS << *doubling, &mut scratch.neighbours);
         let doubling = (0..=DOUBLINGS).find(is_there)?;
         self.fitted(position, from, RADIUS << doubling, scratch)
     }
 
     /// Collects the particles within this many cells of a position, relative to the corner of its cell (cells), that existed at the first
     /// frame. Returns whether any particle is near, even one that did not.
-    fn gather(&self, cell: Coord, from: DVec3, rings: i32, seen: &mut Vec<Seen>) -> bool {
-        seen.clear();
+    fn gather(&self, cell: Coord, from: DVec3, rings: i32, neighbours: &mut Vec<Neighbour>) -> bool {
+        neighbours.clear();
         let (mut is_any, square) = (false, f64::from(rings * rings));
         let [low, high] = [-rings, rings].map(|by| cell.map(|at| at + by));
         self.cells.near(low, high, cell, |particle, offset| {
@@ -194,7 +194,13 @@ impl Field {
             if q > 0.0 {
                 is_any = true;
                 if let (now, Some(first)) = self.particles[particle] {
-                    seen.push(Seen { offset, now, first, weight: q * q * q, head: None });
+                    neighbours.push(Neighbour {
+                        offset,
+                        now,
+                        first,
+                        weight: q * q * q,
+                        representative: None,
+                    });
                 }
             }
         });
@@ -204,48 +210,51 @@ impl Field {
     /// The first position that the particles gathered within a radius (spacings) give for a position (m), which lies at `from` relative to
     /// the corner of its cell (cells).
     fn fitted(&self, position: DVec3, from: DVec3, radius: i32, scratch: &mut Scratch) -> Option<DVec3> {
-        let Scratch { seen, near, room } = scratch;
-        let most = TOGETHER * f64::from(radius) * self.spacing;
-        let head = heaviest_origin(seen, most)?;
-        let Seen { now, first, .. } = seen[head];
-        let way = first - now;
+        let Scratch { neighbours, near, in_radius } = scratch;
+        let max_distance = TOGETHER * f64::from(radius) * self.spacing;
+        let representative = heaviest_origin(neighbours, max_distance)?;
+        let Neighbour { now, first, .. } = neighbours[representative];
+        let displacement = first - now;
         // In spacings. Displacements are relative to that of the representative: they may be long, and differ by little.
         let edge = (self.cells.edge() / self.spacing) as f32;
         near.clear();
-        for one in seen.iter().filter(|one| one.head == Some(head)) {
-            let turn = (one.first - one.now - way) / self.spacing;
-            near.push(one.offset.map(|x| edge * x), [turn.x as f32, turn.y as f32, turn.z as f32]);
+        for one in neighbours.iter().filter(|one| one.representative == Some(representative)) {
+            let residual = (one.first - one.now - displacement) / self.spacing;
+            near.push(
+                one.offset.map(|x| edge * x),
+                [residual.x as f32, residual.y as f32, residual.z as f32],
+            );
         }
         let at = [from.x, from.y, from.z].map(|x| edge * x as f32);
-        let to = |turn: DVec3| position + way + turn * self.spacing;
-        let Some(sums) = sums(near, room, at, radius as f32) else { return Some(to(DVec3::zeros())) };
+        let to = |residual: DVec3| position + displacement + residual * self.spacing;
+        let Some(sums) = sums(near, in_radius, at, radius as f32) else { return Some(to(DVec3::zeros())) };
         let fit = to(sums.map().at(DVec3::zeros()));
         // If so few particles extrapolate far away, their mean is no worse.
-        Some(if (fit - first).norm() <= most { fit } else { to(sums.mean()) })
+        Some(if (fit - first).norm() <= max_distance { fit } else { to(sums.mean()) })
     }
 }
 
-/// Groups particles by origin: those within `most` (m) of the heaviest one that is left form a group. Returns the representative of the
+/// Groups particles by origin: those within `max_distance` (m) of the heaviest one that is left form a group. Returns the representative of the
 /// group with the largest total weight; none without particles.
-fn heaviest_origin(seen: &mut [Seen], most: f64) -> Option<usize> {
-    let mut left: f64 = seen.iter().map(|one| one.weight).sum();
+fn heaviest_origin(neighbours: &mut [Neighbour], max_distance: f64) -> Option<usize> {
+    let mut left: f64 = neighbours.iter().map(|one| one.weight).sum();
     let mut best: Option<(f64, usize)> = None;
     while best.is_none_or(|(weight, _)| left > weight) {
-        let free = seen.iter().enumerate().filter(|(_, one)| one.head.is_none());
-        let Some((head, _)) = free.max_by(|a, b| a.1.weight.total_cmp(&b.1.weight)) else { break };
-        let (first, mut weight) = (seen[head].first, 0.0);
-        for one in seen.iter_mut().filter(|one| one.head.is_none()) {
-            if (one.first - first).norm() <= most {
-                one.head = Some(head);
+        let free = neighbours.iter().enumerate().filter(|(_, one)| one.representative.is_none());
+        let Some((representative, _)) = free.max_by(|a, b| a.1.weight.total_cmp(&b.1.weight)) else { break };
+        let (first, mut weight) = (neighbours[representative].first, 0.0);
+        for one in neighbours.iter_mut().filter(|one| one.representative.is_none()) {
+            if (one.first - first).norm() <= max_distance {
+                one.representative = Some(representative);
                 weight += one.weight;
             }
         }
         left -= weight;
         if best.is_none_or(|(other, _)| weight > other) {
-            best = Some((weight, head));
+            best = Some((weight, representative));
         }
     }
-    best.map(|(_, head)| head)
+    best.map(|(_, representative)| representative)
 }
 
 #[cfg(test)]
@@ -312,10 +321,12 @@ mod tests {
         let ctx = context(2);
         // Two blocks with a gap of 5 between them, which closes to one spacing, and to a half.
         for deep in [0.0, 0.5] {
-            let ways = [DVec3::new(2.0 + 0.5 * deep, 0.0, 0.0), DVec3::new(-2.0 - 0.5 * deep, 0.0, 0.0)];
+            let displacements =
+                [DVec3::new(2.0 + 0.5 * deep, 0.0, 0.0), DVec3::new(-2.0 - 0.5 * deep, 0.0, 0.0)];
             let corners = [DVec3::zeros(), DVec3::new(10.0, 0.3, 0.4)];
             let all = |share: f64| {
-                let one = |n: usize| block(corners[n], 6).map(move |position| position + ways[n] * share);
+                let one =
+                    |n: usize| block(corners[n], 6).map(move |position| position + displacements[n] * share);
                 numbered(one(0).chain(one(1)).collect())
             };
             let rest = Rest::of(&all(0.0)).unwrap();
@@ -326,7 +337,7 @@ mod tests {
             let found = rest.positions(&ctx, &all(1.0), 1.0, &at).unwrap();
             let mut counts = [0; 2];
             for (position, found) in at.iter().zip(&found) {
-                let off = ways.map(|way| (found.unwrap() + way - position).norm());
+                let off = displacements.map(|displacement| (found.unwrap() + displacement - position).norm());
                 let nearer = usize::from(off[1] < off[0]);
                 assert!(off[nearer] < 1e-3, "{deep}, {position}: {off:?}");
                 counts[nearer] += 1;

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::geometry::DVec3;
 
 /// Count of particles whose neighbours are used, and the count that suffices for a rough estimate.
-const LOOKED_AT: [usize; 2] = [256, 32];
+const SAMPLES: [usize; 2] = [256, 32];
 /// In a cubic grid this many particles are one spacing away. In a liquid they are nearer and farther, at the same mean distance (1.02
 /// spacings in frames of two solvers' caches).
 const NEIGHBOURS: usize = 6;
@@ -13,15 +13,15 @@ const NEIGHBOURS: usize = 6;
 /// The spacing (m) of particles at positions (m): the median of the mean distance to the six nearest ones. None for fewer than seven
 /// particles, or if too many lie at one position.
 pub fn estimate(positions: &[DVec3]) -> Option<f64> {
-    median(positions, LOOKED_AT[0])
+    median(positions, SAMPLES[0])
 }
 
 /// The same within a tenth or so, in an eighth of the time: to check whether a given spacing is plausible.
 pub fn rough(positions: &[DVec3]) -> Option<f64> {
-    median(positions, LOOKED_AT[1])
+    median(positions, SAMPLES[1])
 }
 
-fn median(positions: &[DVec3], looked_at: usize) -> Option<f64> {
+fn median(positions: &[DVec3], samples: usize) -> Option<f64> {
     // The same particles are used in whatever order they come.
     let mut order: Vec<usize> = (0..positions.len()).collect();
     let key = |at: &usize| positions[*at];
@@ -29,7 +29,7 @@ fn median(positions: &[DVec3], looked_at: usize) -> Option<f64> {
         let (a, b) = (key(a), key(b));
         a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z))
     });
-    let step = order.len().div_ceil(looked_at).max(1);
+    let step = order.len().div_ceil(samples).max(1);
     let mean = |at: &usize| {
         let mut nearest = [f64::INFINITY; NEIGHBOURS + 1];
         for position in positions {
@@ -43,8 +43,8 @@ fn median(positions: &[DVec3], looked_at: usize) -> Option<f64> {
         // The nearest is the particle itself.
         nearest[1..].iter().map(|square| square.sqrt()).sum::<f64>() / NEIGHBOURS as f64
     };
-    let looked_at: Vec<usize> = order.into_iter().step_by(step).collect();
-    let mut distances: Vec<f64> = looked_at.par_iter().map(mean).collect();
+    let samples: Vec<usize> = order.into_iter().step_by(step).collect();
+    let mut distances: Vec<f64> = samples.par_iter().map(mean).collect();
     distances.sort_unstable_by(f64::total_cmp);
     let middle = *distances.get(distances.len() / 2)?;
     (middle > 0.0 && middle.is_finite()).then_some(middle)

@@ -6,12 +6,12 @@ use crate::geometry::DVec3;
 use crate::geometry::check::topology::Sets;
 use crate::geometry::coords::around;
 
-/// Which particles at positions (m), whose spacing is `spacing` (m), belong to groups of fewer than `least`. Two particles are in the same
+/// Which particles at positions (m), whose spacing is `spacing` (m), belong to groups of fewer than `min_count`. Two particles are in the same
 /// group if the cells of one spacing that hold them touch.
 ///
 /// # Errors
 /// Particles too far apart.
-pub fn specks(positions: &[DVec3], spacing: f64, least: usize) -> Result<Vec<bool>> {
+pub fn specks(positions: &[DVec3], spacing: f64, min_count: usize) -> Result<Vec<bool>> {
     let cells = Cells::new(positions, spacing, i64::from)?;
     let runs: Vec<&[u32]> = cells.runs().collect();
     let mut sets = Sets::new(runs.len());
@@ -30,7 +30,7 @@ pub fn specks(positions: &[DVec3], spacing: f64, least: usize) -> Result<Vec<boo
     groups.iter().zip(&runs).for_each(|(group, run)| counts[*group as usize] += run.len());
     let mut out = vec![false; positions.len()];
     for (group, run) in groups.iter().zip(&runs) {
-        if counts[*group as usize] < least {
+        if counts[*group as usize] < min_count {
             run.iter().for_each(|particle| out[*particle as usize] = true);
         }
     }

@@ -8,7 +8,7 @@ use super::vertex_rings::{Edge, VertexRings};
 use crate::geometry::DVec3;
 
 /// Maximum number of neighbours of a vertex for the rule.
-const MOST: usize = 24;
+const MAX_NEIGHBOURS: usize = 24;
 /// Maximum distance from the edge's midpoint, in edge lengths: where the surface is folded the rule is meaningless.
 const FAR: f64 = 0.25;
 
@@ -36,7 +36,7 @@ impl VertexRings<'_, '_> {
     }
 
     fn butterfly(&self, [a, b]: [u32; 2]) -> Option<DVec3> {
-        let rings = [self.ring_from(a, b, MOST)?, self.ring_from(b, a, MOST)?];
+        let rings = [self.ring_from(a, b, MAX_NEIGHBOURS)?, self.ring_from(b, a, MAX_NEIGHBOURS)?];
         if rings.iter().flatten().any(|&vertex| self.is_flagged(vertex)) {
             return None;
         }

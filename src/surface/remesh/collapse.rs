@@ -9,7 +9,7 @@ use crate::geometry::shape::normal;
 /// Minimum spread of normals on a ridge or in a corner: that of two planes of the same area that meet at 30 degrees.
 const SPREAD: f64 = 0.0625;
 /// Minimum quality of triangles after a collapse, unless it was lower before.
-const LEAST: f64 = 0.05;
+const MIN_QUALITY: f64 = 0.05;
 /// Below this quality a triangle's normal is meaningless.
 const SLIVER: f64 = 1e-4;
 /// Maximum length of edges after a collapse (targets): shorter than an edge that is split, which would undo it.
@@ -58,24 +58,24 @@ impl VertexRings<'_, '_> {
         if worth_a < worth_b {
             return vec![into(b, a)];
         }
-        let mut ways = vec![into(a, b), into(b, a)];
+        let mut collapses = vec![into(a, b), into(b, a)];
         if worth_a == (1, false) {
             let (position, size) = (self.middle([a, b]), mean(self.size(a), self.size(b)));
-            ways.insert(0, Collapse { from: b, to: a, position, size });
+            collapses.insert(0, Collapse { from: b, to: a, position, size });
         }
-        ways
+        collapses
     }
 
     /// Whether a collapse preserves a closed 2-manifold and leaves valid triangles; the triangles of a fold that is to be removed may turn
     /// over.
-    pub fn may(&self, collapse: &Collapse, folded: &[u32]) -> bool {
+    pub fn is_allowed(&self, collapse: &Collapse, folded: &[u32]) -> bool {
         let mut moving = self.moving(collapse).into_iter();
-        moving.all(|triangle| self.bears(triangle, collapse, folded))
+        moving.all(|triangle| self.is_valid_after(triangle, collapse, folded))
             && self.may_join(collapse.from, collapse.to)
     }
 
     /// Whether a triangle is valid after a collapse, or removed by it.
-    fn bears(&self, triangle: u32, collapse: &Collapse, folded: &[u32]) -> bool {
+    fn is_valid_after(&self, triangle: u32, collapse: &Collapse, folded: &[u32]) -> bool {
         let &Collapse { from, to, position, size } = collapse;
         let corners = self.corners(triangle);
         if corners.iter().any(|&corner| self.is_flagged(corner)) {
@@ -94,13 +94,13 @@ impl VertexRings<'_, '_> {
         let new = corners.map(|corner| if moves(corner) { position } else { self.position(corner) });
         let before = quality(&old);
         let keeps_side = folded.contains(&triangle) || before < SLIVER || is_upright(&old, &new);
-        keeps_side && quality(&new) >= before.min(LEAST) && corners.into_iter().all(is_short)
+        keeps_side && quality(&new) >= before.min(MIN_QUALITY) && corners.into_iter().all(is_short)
     }
 
     /// The collapse that unfolds a triangle, created or changed in this frame, from one that it is folded onto: the shortest of their edges
     /// that may collapse and has an end created in this frame. None if it is not folded, or no edge may collapse.
     pub fn unfolding(&self, triangle: u32) -> Option<Collapse> {
-        if !self.is_there(triangle) || self.is_whole(triangle) {
+        if !self.exists(triangle) || self.is_whole(triangle) {
             return None;
         }
         let [a, b, c] = self.corners(triangle);
@@ -118,8 +118,10 @@ impl VertexRings<'_, '_> {
             });
             edges.sort_unstable_by(|one, two| one.0.total_cmp(&two.0).then(one.1.cmp(&two.1)));
             let is_made = |ends: &[u32; 2]| ends.iter().any(|&end| !self.has_origin(end));
-            let ways = edges.into_iter().map(|(_, ends)| ends).filter(is_made);
-            ways.flat_map(|ends| self.collapses(ends)).find(|way| self.may(way, &edge.triangles))
+            let candidates = edges.into_iter().map(|(_, ends)| ends).filter(is_made);
+            candidates
+                .flat_map(|ends| self.collapses(ends))
+                .find(|collapse| self.is_allowed(collapse, &edge.triangles))
         })
     }
 }
@@ -166,16 +168,19 @@ mod tests {
         let offers = |body: &mut Body| {
             let mut mesh = body.improvable();
             let rings = VertexRings::of(&mut mesh);
-            let ways = rings.collapses([a, b]);
-            (ways.iter().map(|way| (way.from, way.to)).collect::<Vec<_>>(), ways[0].position)
+            let collapses = rings.collapses([a, b]);
+            (
+                collapses.iter().map(|collapse| (collapse.from, collapse.to)).collect::<Vec<_>>(),
+                collapses[0].position,
+            )
         };
         let position = |body: &Body, vertex: u32| body.positions[vertex as usize];
         assert_eq!(offers(&mut body), (vec![(high, low), (low, high)], position(&body, low)));
         body.origins[low as usize] = None;
         assert_eq!(offers(&mut body), (vec![(low, high)], position(&body, high)));
         body.origins[high as usize] = None;
-        let (ways, middle) = offers(&mut body);
-        assert_eq!(ways, [(high, low), (high, low), (low, high)]);
+        let (collapses, middle) = offers(&mut body);
+        assert_eq!(collapses, [(high, low), (high, low), (low, high)]);
         assert!((middle - 0.5 * (position(&body, low) + position(&body, high))).norm() < 0.03);
         // A spike is a corner.
         body.positions[low as usize] *= 1.2;
@@ -186,25 +191,28 @@ mod tests {
     fn what_would_be_long_flat_turned_over_or_flagged_may_not() {
         let mut body = sphere(3);
         let [a, b, c] = body.triangles[100];
-        let may = |body: &mut Body| {
+        let is_allowed = |body: &mut Body| {
             let mut mesh = body.improvable();
             let rings = VertexRings::of(&mut mesh);
-            rings.collapses([a, b]).iter().any(|way| rings.may(way, &[]))
+            rings.collapses([a, b]).iter().any(|collapse| rings.is_allowed(collapse, &[]))
         };
         // With the sizes at birth the resulting edges would be too long.
-        assert!(!may(&mut body));
+        assert!(!is_allowed(&mut body));
         body.sizes.iter_mut().flatten().for_each(|size| *size *= 2.0);
-        assert!(may(&mut body));
+        assert!(is_allowed(&mut body));
         body.flags[c as usize] = true;
-        assert!(!may(&mut body));
+        assert!(!is_allowed(&mut body));
         body.flags[c as usize] = false;
         // A position beyond the ring turns triangles over.
         body.sizes.iter_mut().flatten().for_each(|size| *size *= 10.0);
         let mut mesh = body.improvable();
         let rings = VertexRings::of(&mut mesh);
-        let way = rings.collapses([a, b])[0];
-        let beyond = 3.5 * rings.position(way.from) - 2.5 * rings.position(way.to);
-        assert!(rings.may(&way, &[]) && !rings.may(&Collapse { position: beyond, ..way }, &[]));
+        let collapse = rings.collapses([a, b])[0];
+        let beyond = 3.5 * rings.position(collapse.from) - 2.5 * rings.position(collapse.to);
+        assert!(
+            rings.is_allowed(&collapse, &[])
+                && !rings.is_allowed(&Collapse { position: beyond, ..collapse }, &[])
+        );
     }
 
     #[test]
@@ -226,8 +234,12 @@ mod tests {
             let rings = VertexRings::of(&mut mesh);
             (0..512).filter_map(|triangle| rings.unfolding(triangle)).collect::<Vec<_>>()
         };
-        let ways = folded(true);
-        assert!(!ways.is_empty() && ways.iter().all(|way| way.from == 100 || way.to == 100), "{ways:?}");
+        let collapses = folded(true);
+        assert!(
+            !collapses.is_empty()
+                && collapses.iter().all(|collapse| collapse.from == 100 || collapse.to == 100),
+            "{collapses:?}"
+        );
         assert!(folded(false).is_empty());
     }
 }

@@ -1,13 +1,13 @@
 //! Whether an edge should be flipped.
 
 use super::improvable::TOO_LONG;
-use super::shape::{is_upright, least_angle};
+use super::shape::{is_upright, min_angle};
 use super::vertex_rings::{Edge, VertexRings};
 use crate::geometry::fans::flipped;
 use crate::geometry::shape::normal;
 
 /// Triangles whose smallest angle (degrees) is at least this are left alone.
-const LEAST: f64 = 20.0;
+const MIN_ANGLE: f64 = 20.0;
 /// Minimum increase (degrees) of the smallest angle of the two triangles by a flip.
 const GAIN: f64 = 5.0;
 /// Minimum cosine between the normals of the two triangles: they meet at up to 30 degrees.
@@ -16,9 +16,9 @@ const FLAT: f64 = 0.866;
 impl VertexRings<'_, '_> {
     /// The edge of a triangle whose flip is best. None if its angles are not small, or no flip is clearly better; the artist's own triangles
     /// and those at flagged vertices are not flipped.
-    pub fn better(&self, triangle: u32) -> Option<Edge> {
-        let may = self.is_there(triangle) && !self.is_whole(triangle);
-        if !may || least_angle(&self.positions(triangle)) >= LEAST {
+    pub fn best_flip(&self, triangle: u32) -> Option<Edge> {
+        let is_allowed = self.exists(triangle) && !self.is_whole(triangle);
+        if !is_allowed || min_angle(&self.positions(triangle)) >= MIN_ANGLE {
             return None;
         }
         let [a, b, c] = self.corners(triangle);
@@ -26,7 +26,7 @@ impl VertexRings<'_, '_> {
         for ends in [[a, b], [b, c], [c, a]] {
             if let Some(edge) = self.edge(ends)
                 && let Some(gain) = self.gain(&edge)
-                && best.is_none_or(|(most, _)| gain > most)
+                && best.is_none_or(|(best, _)| gain > best)
             {
                 best = Some((gain, edge));
             }
@@ -53,7 +53,7 @@ impl VertexRings<'_, '_> {
         if !new.iter().all(|corners| is_upright(side, corners)) {
             return None;
         }
-        let [before, after] = [&old, &new].map(|[one, two]| least_angle(one).min(least_angle(two)));
+        let [before, after] = [&old, &new].map(|[one, two]| min_angle(one).min(min_angle(two)));
         Some(after - before).filter(|gain| *gain >= GAIN)
     }
 }
@@ -76,10 +76,10 @@ mod tests {
         body
     }
 
-    fn better(body: &mut Body) -> Option<Edge> {
+    fn best_flip(body: &mut Body) -> Option<Edge> {
         let mut mesh = body.improvable();
         let rings = VertexRings::of(&mut mesh);
-        let [one, two] = [0, 1].map(|triangle| rings.better(triangle));
+        let [one, two] = [0, 1].map(|triangle| rings.best_flip(triangle));
         assert_eq!(one.is_some(), two.is_some());
         one
     }
@@ -87,21 +87,21 @@ mod tests {
     #[test]
     fn an_edge_flips_where_that_is_clearly_better() {
         let flip = Edge { triangles: [0, 1], corners: [0, 1, 2, 3] };
-        assert_eq!(better(&mut kite(0.5, 0.0)), Some(flip));
-        assert_eq!(better(&mut kite(0.5, 25.0)), Some(flip));
+        assert_eq!(best_flip(&mut kite(0.5, 0.0)), Some(flip));
+        assert_eq!(best_flip(&mut kite(0.5, 25.0)), Some(flip));
         // Not flat, too little gain, already good.
-        assert_eq!(better(&mut kite(0.5, 35.0)), None);
-        assert_eq!(better(&mut kite(0.1, 0.0)), None);
-        assert_eq!(better(&mut kite(0.8, 0.0)), None);
+        assert_eq!(best_flip(&mut kite(0.5, 35.0)), None);
+        assert_eq!(best_flip(&mut kite(0.1, 0.0)), None);
+        assert_eq!(best_flip(&mut kite(0.8, 0.0)), None);
         for source in [Source::Whole(3), Source::New] {
             let mut body = kite(0.5, 0.0);
             body.sources[1] = source;
             let mut mesh = body.improvable();
-            assert_eq!(VertexRings::of(&mut mesh).better(0), (source == Source::New).then_some(flip));
+            assert_eq!(VertexRings::of(&mut mesh).best_flip(0), (source == Source::New).then_some(flip));
         }
         let mut body = kite(0.5, 0.0);
         body.flags[3] = true;
-        assert_eq!(better(&mut body), None);
+        assert_eq!(best_flip(&mut body), None);
         // The new edge exists already, or would be too long.
         let mut body = kite(0.5, 0.0);
         body.triangles.push([2, 3, 0]);
@@ -110,12 +110,12 @@ mod tests {
         assert_eq!(VertexRings::of(&mut mesh).gain(&flip), None);
         let mut body = kite(0.5, 0.0);
         body.sizes = vec![[0.5; 2]; 4];
-        assert_eq!(better(&mut body), None);
+        assert_eq!(best_flip(&mut body), None);
         // Triangles that do not make a convex quadrangle would turn over.
         let mut body = kite(0.5, 0.0);
         body.positions[2].x = 4.0;
         body.positions[3].x = 4.0;
-        assert_eq!(better(&mut body), None);
+        assert_eq!(best_flip(&mut body), None);
     }
 
     #[test]
@@ -125,9 +125,9 @@ mod tests {
             body.sources[1] = other;
             let mut mesh = body.improvable();
             let mut rings = VertexRings::of(&mut mesh);
-            let edge = rings.better(0).unwrap();
+            let edge = rings.best_flip(0).unwrap();
             rings.flip(&edge);
-            assert_eq!((rings.take_touched(), rings.better(0)), (vec![0, 1], None));
+            assert_eq!((rings.take_touched(), rings.best_flip(0)), (vec![0, 1], None));
             rings.finish();
             assert_eq!(body.triangles, [[2, 0, 3], [3, 1, 2]]);
             assert_eq!(body.sources, [expected; 2]);

@@ -21,7 +21,7 @@ pub struct Improvable<'a> {
     /// For each vertex, whether its triangles are left alone: what is broken is rebuilt in the next frame.
     pub flags: &'a mut Vec<bool>,
     /// Change of lengths where the liquid only jitters.
-    pub tremble: f64,
+    pub jitter: f64,
 }
 
 impl Improvable<'_> {
@@ -46,7 +46,7 @@ impl Improvable<'_> {
     }
 
     /// Whether an edge is out of range, and not at rest.
-    pub fn needs(&self, ends: [u32; 2], is_out: fn(f64) -> bool) -> bool {
+    pub fn needs_change(&self, ends: [u32; 2], is_out: fn(f64) -> bool) -> bool {
         is_out(self.stretch(ends)) && self.is_strained(ends)
     }
 
@@ -55,7 +55,7 @@ impl Improvable<'_> {
         if [a, b, c].into_iter().any(|corner| self.flags[corner as usize]) {
             return false;
         }
-        let is_out = |ends: [u32; 2]| self.needs(ends, is_long) || self.needs(ends, is_short);
+        let is_out = |ends: [u32; 2]| self.needs_change(ends, is_long) || self.needs_change(ends, is_short);
         !matches!(source, Source::Whole(_)) || [[a, b], [b, c], [c, a]].into_iter().any(is_out)
     }
 }

@@ -35,11 +35,11 @@ const ROUNDS: usize = 5;
 /// Sweeps in a frame: the changes of one are checked in the next.
 const SWEEPS: usize = 3;
 /// How often vertices move in a sweep.
-const RELAXED: usize = 3;
+const RELAXATIONS: usize = 3;
 /// Triangles per task.
 const GRAIN: usize = 4096;
 /// Operations between two checks for a cancel.
-const LOOK: usize = 256;
+const CHECK_INTERVAL: usize = 256;
 
 /// Counts of the operations that improved a mesh.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -154,8 +154,8 @@ impl Work<'_, '_, '_> {
         let edges = self.edges(near, is_long, -1.0);
         self.rounds -= usize::from(!edges.is_empty());
         for (n, ends) in edges.into_iter().enumerate() {
-            self.look(n)?;
-            let edge = self.rings.edge(ends).filter(|_| self.rings.needs(ends, is_long));
+            self.check_cancel(n)?;
+            let edge = self.rings.edge(ends).filter(|_| self.rings.needs_change(ends, is_long));
             if let Some(edge) = edge
                 && !edge.corners.iter().any(|&corner| self.rings.is_flagged(corner))
             {
@@ -171,13 +171,14 @@ impl Work<'_, '_, '_> {
     fn collapse(&mut self, near: &[u32]) -> Result<()> {
         let edges = self.edges(near, is_short, 1.0);
         for (n, ends) in edges.into_iter().enumerate() {
-            self.look(n)?;
-            if self.rings.edge(ends).is_none() || !self.rings.needs(ends, is_short) {
+            self.check_cancel(n)?;
+            if self.rings.edge(ends).is_none() || !self.rings.needs_change(ends, is_short) {
                 continue;
             }
-            let way = self.rings.collapses(ends).into_iter().find(|way| self.rings.may(way, &[]));
-            if let Some(way) = way {
-                self.rings.collapse(&way);
+            let collapse =
+                self.rings.collapses(ends).into_iter().find(|collapse| self.rings.is_allowed(collapse, &[]));
+            if let Some(collapse) = collapse {
+                self.rings.collapse(&collapse);
                 self.done.collapses += 1;
             }
         }
@@ -187,9 +188,9 @@ impl Work<'_, '_, '_> {
     /// Removes folds.
     fn unfold(&mut self, near: &[u32]) -> Result<()> {
         for (n, &triangle) in near.iter().enumerate() {
-            self.look(n)?;
-            if let Some(way) = self.rings.unfolding(triangle) {
-                self.rings.collapse(&way);
+            self.check_cancel(n)?;
+            if let Some(collapse) = self.rings.unfolding(triangle) {
+                self.rings.collapse(&collapse);
                 self.done.collapses += 1;
             }
         }
@@ -199,8 +200,8 @@ impl Work<'_, '_, '_> {
     /// Flips edges of thin triangles.
     fn flip(&mut self, near: &[u32]) -> Result<()> {
         for (n, &triangle) in near.iter().enumerate() {
-            self.look(n)?;
-            if let Some(edge) = self.rings.better(triangle) {
+            self.check_cancel(n)?;
+            if let Some(edge) = self.rings.best_flip(triangle) {
                 self.rings.flip(&edge);
                 self.done.flips += 1;
             }
@@ -210,15 +211,15 @@ impl Work<'_, '_, '_> {
 
     /// Moves vertices created in this frame.
     fn relax(&mut self, near: &[u32]) -> Result<()> {
-        let there = near.iter().filter(|triangle| self.rings.is_there(**triangle));
+        let there = near.iter().filter(|triangle| self.rings.exists(**triangle));
         let mut vertices: Vec<u32> = there.flat_map(|triangle| self.rings.corners(*triangle)).collect();
         vertices.sort_unstable();
         vertices.dedup();
-        for _ in 0..RELAXED {
+        for _ in 0..RELAXATIONS {
             for (n, vertex) in vertices.iter().enumerate() {
-                self.look(n)?;
+                self.check_cancel(n)?;
                 if let Some(position) = self.rings.relaxed(*vertex) {
-                    self.rings.put(*vertex, position);
+                    self.rings.move_vertex(*vertex, position);
                 }
             }
         }
@@ -229,11 +230,11 @@ impl Work<'_, '_, '_> {
     /// vertices.
     fn edges(&self, near: &[u32], is_out: fn(f64) -> bool, sign: f64) -> Vec<[u32; 2]> {
         let mut edges = Vec::new();
-        for &triangle in near.iter().filter(|triangle| self.rings.is_there(**triangle)) {
+        for &triangle in near.iter().filter(|triangle| self.rings.exists(**triangle)) {
             let [a, b, c] = self.rings.corners(triangle);
             for [a, b] in [[a, b], [b, c], [c, a]] {
                 let ends = [a.min(b), a.max(b)];
-                if self.rings.needs(ends, is_out) {
+                if self.rings.needs_change(ends, is_out) {
                     edges.push((sign * self.rings.length(ends), ends));
                 }
             }
@@ -243,8 +244,8 @@ impl Work<'_, '_, '_> {
         edges.into_iter().map(|(_, ends)| ends).collect()
     }
 
-    fn look(&self, n: usize) -> Result<()> {
-        if n.is_multiple_of(LOOK) { self.ctx.check() } else { Ok(()) }
+    fn check_cancel(&self, n: usize) -> Result<()> {
+        if n.is_multiple_of(CHECK_INTERVAL) { self.ctx.check() } else { Ok(()) }
     }
 }
 

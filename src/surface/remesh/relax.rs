@@ -1,6 +1,6 @@
 //! Vertices created in this frame move along the surface toward the middle of their neighbours: edges and angles become even.
 
-use super::shape::{is_upright, least_angle};
+use super::shape::{is_upright, min_angle};
 use super::vertex_rings::VertexRings;
 use crate::geometry::DVec3;
 use crate::geometry::shape::normal;
@@ -27,8 +27,8 @@ impl VertexRings<'_, '_> {
             across += normal(&self.positions(triangle));
         }
         let across = across.try_normalize(0.0)?;
-        let way = sum / (2.0 * fan.len() as f64) - position;
-        let to = position + (way - across * across.dot(&way)) * SHARE;
+        let offset = sum / (2.0 * fan.len() as f64) - position;
+        let to = position + (offset - across * across.dot(&offset)) * SHARE;
         let (mut before, mut after) = (f64::INFINITY, f64::INFINITY);
         for &triangle in fan {
             let old = self.positions(triangle);
@@ -38,7 +38,7 @@ impl VertexRings<'_, '_> {
             if !is_upright(&old, &new) {
                 return None;
             }
-            (before, after) = (before.min(least_angle(&old)), after.min(least_angle(&new)));
+            (before, after) = (before.min(min_angle(&old)), after.min(min_angle(&new)));
         }
         (after > before).then_some(to)
     }

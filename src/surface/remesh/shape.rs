@@ -12,7 +12,7 @@ pub(super) fn quality(corners: &[DVec3; 3]) -> f64 {
 }
 
 /// Smallest angle of a triangle (degrees): that between its two longest edges. 0 if one of these has no length.
-pub(super) fn least_angle(corners: &[DVec3; 3]) -> f64 {
+pub(super) fn min_angle(corners: &[DVec3; 3]) -> f64 {
     let [a, b, c] = corners;
     let mut lengths = [(b - a).norm(), (c - b).norm(), (a - c).norm()];
     lengths.sort_unstable_by(f64::total_cmp);
@@ -34,13 +34,13 @@ mod tests {
     fn shapes_are_those_of_the_book() {
         let triangle = |tip: [f64; 3]| [DVec3::zeros(), DVec3::x() * 2.0, DVec3::from(tip)];
         let even = triangle([1.0, libm::sqrt(3.0), 0.0]);
-        assert!((least_angle(&even) - 60.0).abs() < 1e-6 && (quality(&even) - 0.75f64.sqrt()).abs() < 1e-12);
+        assert!((min_angle(&even) - 60.0).abs() < 1e-6 && (quality(&even) - 0.75f64.sqrt()).abs() < 1e-12);
         let half = triangle([0.0, 2.0, 0.0]);
-        assert!((least_angle(&half) - 45.0).abs() < 1e-9 && (quality(&half) - 0.5).abs() < 1e-12);
+        assert!((min_angle(&half) - 45.0).abs() < 1e-9 && (quality(&half) - 0.5).abs() < 1e-12);
         let flat = triangle([1.0, 0.0, 0.0]);
-        assert_eq!((least_angle(&flat), quality(&flat)), (0.0, 0.0));
+        assert_eq!((min_angle(&flat), quality(&flat)), (0.0, 0.0));
         let nothing = [DVec3::x(); 3];
-        assert_eq!((least_angle(&nothing), quality(&nothing)), (0.0, 0.0));
+        assert_eq!((min_angle(&nothing), quality(&nothing)), (0.0, 0.0));
         let leaning = |degrees: f64| {
             let (up, out) = (libm::sin(degrees.to_radians()), libm::cos(degrees.to_radians()));
             triangle([1.0, out, up])

@@ -5,10 +5,10 @@ use super::Improvable;
 use super::improvable::{TOO_LONG, TOO_SHORT};
 use crate::geometry::DVec3;
 
-/// Change of a length since the reference from which on an edge is not at rest (targets, and [`Improvable::tremble`]). Particles at rest
+/// Change of a length since the reference from which on an edge is not at rest (targets, and [`Improvable::jitter`]). Particles at rest
 /// that jitter by 0.02 spacings change lengths by up to 0.02 targets, and by 0.01 spacings.
 const STRAIN: f64 = 0.04;
-/// Displacement since the reference up to which a vertex is at rest ([`Improvable::tremble`]): 0.3 spacings. On a sheet half a spacing
+/// Displacement since the reference up to which a vertex is at rest ([`Improvable::jitter`]): 0.3 spacings. On a sheet half a spacing
 /// thick, where fits extrapolate far beyond the particles, a jitter of 0.02 spacings displaces vertices by up to 0.26.
 const STILL: f64 = 30.0;
 /// In a creeping liquid, an edge that changes more slowly is checked too each time it crosses one of a series of limits: the first is this
@@ -35,9 +35,9 @@ impl Improvable<'_> {
         let target = if now > longest { longest } else { shortest };
         let change = (now - before).abs();
         // Particles that have not moved cause no strain, even if a fit through few of them says so.
-        let is_still = |at: usize| drift(at).norm() <= STILL * self.tremble;
+        let is_still = |at: usize| drift(at).norm() <= STILL * self.jitter;
         let is_still = is_still(a) && is_still(b);
-        let rests = is_still || change <= (STRAIN * target).max(self.tremble);
+        let rests = is_still || change <= (STRAIN * target).max(self.jitter);
         let limits = |length: f64| limits(length / target, if is_still { AT_REST } else { 1.0 });
         !rests || limits(now) > limits(before)
     }
@@ -68,19 +68,19 @@ mod tests {
     }
 
     /// Whether an edge of this length (targets) is strained between two vertices with these drifts.
-    fn is_strained_by(length: f64, drifts: [[f32; 3]; 2], tremble: f64) -> bool {
+    fn is_strained_by(length: f64, drifts: [[f32; 3]; 2], jitter: f64) -> bool {
         let mut body = Body::of(vec![DVec3::zeros(), DVec3::x() * length, DVec3::y()], vec![[0, 1, 2]]);
         body.sizes = vec![[1.0; 2]; 3];
         body.drifts = vec![drifts[0], drifts[1], [0.0; 3]];
-        body.tremble = tremble;
+        body.jitter = jitter;
         body.improvable().is_strained([0, 1])
     }
 
     #[test]
     fn an_edge_rests_until_it_changes_or_creeps_far_out() {
         // Two vertices 1.6 targets apart, of which the second was this much nearer before.
-        let is_strained = |length: f64, nearer: f32, tremble: f64| {
-            is_strained_by(length, [[100.0, 7.0, 0.0], [100.0 + nearer, 7.0, 0.0]], tremble)
+        let is_strained = |length: f64, nearer: f32, jitter: f64| {
+            is_strained_by(length, [[100.0, 7.0, 0.0], [100.0 + nearer, 7.0, 0.0]], jitter)
         };
         assert!(!is_strained(1.6, 0.0, 0.0) && !is_strained(1.6, 0.03, 0.0) && !is_strained(1.6, -0.03, 0.0));
         assert!(is_strained(1.6, 0.05, 0.0) && is_strained(1.6, -0.05, 0.0) && !is_strained(1.6, 0.05, 0.1));

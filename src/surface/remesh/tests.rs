@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::shape::least_angle;
+use super::shape::min_angle;
 use super::*;
 use crate::error::Error;
 use crate::geometry::check::topology::Topology;
@@ -24,7 +24,7 @@ pub(super) struct Body {
     pub origins: Vec<Option<u32>>,
     pub sources: Vec<Source>,
     pub flags: Vec<bool>,
-    pub tremble: f64,
+    pub jitter: f64,
 }
 
 impl Body {
@@ -36,7 +36,7 @@ impl Body {
             origins: (0..positions.len() as u32).map(Some).collect(),
             sources: (0..triangles.len() as u32).map(Source::Whole).collect(),
             flags: vec![false; positions.len()],
-            tremble: 0.0,
+            jitter: 0.0,
             positions,
             triangles,
         }
@@ -51,7 +51,7 @@ impl Body {
             origins: &mut self.origins,
             sources: &mut self.sources,
             flags: &mut self.flags,
-            tremble: self.tremble,
+            jitter: self.jitter,
         }
     }
 
@@ -170,7 +170,7 @@ fn stretched_and_squeezed_meshes_get_their_edges_back() {
             let change = body.volume() / volume;
             assert!((change - 1.0).abs() < 0.01, "{case}: volume by {change}");
             let mut angles: Vec<f64> =
-                (0..body.triangles.len()).map(|triangle| least_angle(&body.corners(triangle))).collect();
+                (0..body.triangles.len()).map(|triangle| min_angle(&body.corners(triangle))).collect();
             angles.sort_unstable_by(f64::total_cmp);
             let least = angles[angles.len() / 100];
             assert!(least >= 10.0, "{case}: {least} degrees");

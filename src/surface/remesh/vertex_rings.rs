@@ -52,7 +52,7 @@ impl<'m, 'a> VertexRings<'m, 'a> {
     }
 
     /// Whether a triangle has not been removed by a collapse.
-    pub fn is_there(&self, triangle: u32) -> bool {
+    pub fn exists(&self, triangle: u32) -> bool {
         !self.fans.are_dead()[triangle as usize]
     }
 
@@ -77,7 +77,7 @@ impl<'m, 'a> VertexRings<'m, 'a> {
     }
 
     /// Moves a vertex.
-    pub fn put(&mut self, vertex: u32, position: DVec3) {
+    pub fn move_vertex(&mut self, vertex: u32, position: DVec3) {
         self.mesh.positions[vertex as usize] = position;
     }
 
@@ -106,9 +106,9 @@ impl<'m, 'a> VertexRings<'m, 'a> {
         self.mesh.stretch(ends)
     }
 
-    /// See [`Improvable::needs`].
-    pub fn needs(&self, ends: [u32; 2], is_out: fn(f64) -> bool) -> bool {
-        self.mesh.needs(ends, is_out)
+    /// See [`Improvable::needs_change`].
+    pub fn needs_change(&self, ends: [u32; 2], is_out: fn(f64) -> bool) -> bool {
+        self.mesh.needs_change(ends, is_out)
     }
 
     /// The triangles around a vertex; none if it was merged into another.
@@ -132,10 +132,10 @@ impl<'m, 'a> VertexRings<'m, 'a> {
     }
 
     /// The neighbours of a vertex, counter-clockwise seen from outside, starting with `first`. None if there are fewer than 3, or more than
-    /// `most`.
-    pub fn ring_from(&self, vertex: u32, first: u32, most: usize) -> Option<Vec<u32>> {
+    /// `max_neighbours`.
+    pub fn ring_from(&self, vertex: u32, first: u32, max_neighbours: usize) -> Option<Vec<u32>> {
         let count = self.around(vertex).len();
-        if !(3..=most).contains(&count) {
+        if !(3..=max_neighbours).contains(&count) {
             return None;
         }
         let mut ring = Vec::with_capacity(count);
@@ -185,7 +185,7 @@ impl<'m, 'a> VertexRings<'m, 'a> {
         self.mesh.flags.push(false);
         self.is_gone.push(false);
         for (triangle, near, far) in [(one, [a, made, c], [made, b, c]), (two, [b, made, d], [made, a, d])] {
-            self.becomes_part(triangle);
+            self.mark_as_part(triangle);
             self.mesh.triangles[triangle as usize] = near;
             self.mesh.triangles.push(far);
             let source = self.mesh.sources[triangle as usize];
@@ -199,7 +199,7 @@ impl<'m, 'a> VertexRings<'m, 'a> {
     /// Performs a collapse of two vertices that may be merged.
     pub fn collapse(&mut self, collapse: &Collapse) {
         let &Collapse { from, to, position, size } = collapse;
-        self.moving(collapse).into_iter().for_each(|triangle| self.becomes_part(triangle));
+        self.moving(collapse).into_iter().for_each(|triangle| self.mark_as_part(triangle));
         if position != self.position(to) {
             self.mesh.drifts[to as usize] = self.mean_drift(from, to);
         }
@@ -228,7 +228,7 @@ impl<'m, 'a> VertexRings<'m, 'a> {
         [0, 1, 2].map(|axis| 0.5 * (one[axis] + two[axis]))
     }
 
-    fn becomes_part(&mut self, triangle: u32) {
+    fn mark_as_part(&mut self, triangle: u32) {
         let source = &mut self.mesh.sources[triangle as usize];
         if let Source::Whole(of) = *source {
             *source = Source::Part(of);
@@ -283,7 +283,7 @@ mod tests {
         let check = |rings: &VertexRings<'_, '_>| {
             for vertex in 0..rings.mesh.positions.len() as u32 {
                 let names =
-                    |&triangle: &u32| rings.is_there(triangle) && rings.corners(triangle).contains(&vertex);
+                    |&triangle: &u32| rings.exists(triangle) && rings.corners(triangle).contains(&vertex);
                 let expected: Vec<u32> = (0..rings.mesh.triangles.len() as u32).filter(names).collect();
                 let mut around = rings.around(vertex).to_vec();
                 around.sort_unstable();
@@ -317,7 +317,7 @@ mod tests {
         let mut joined = 0;
         for triangle in 0..22 {
             let [to, from] = ends(&rings, triangle);
-            if rings.is_there(triangle) && rings.may_join(from, to) {
+            if rings.exists(triangle) && rings.may_join(from, to) {
                 let (position, size) = (rings.position(to), rings.size(to));
                 rings.collapse(&Collapse { from, to, position, size });
                 joined += 1;

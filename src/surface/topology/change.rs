@@ -1,7 +1,7 @@
-//! Changes the mesh where the liquid has merged or split: it is matched to the particles' surface (thesis 2.4) and rebuilt (2.5) in the
-//! cells in which it no longer fits; elsewhere it stays as it is.
+//! The change of a mesh in a step. Where the liquid has merged or split, the mesh is matched to the particles' surface (thesis 2.4) and
+//! rebuilt (2.5) in the cells in which it no longer fits; then it is improved (2.6).
 
-use super::hidden::Everywhere;
+use super::full_check::FullCheck;
 use super::mesh_distance::Gamma;
 use super::particle_count::ParticleCountTest;
 use crate::context::Context;
@@ -19,17 +19,17 @@ use crate::surface::level_set::sampler::Sampler;
 use crate::surface::remesh::{Improvable, Improvements, Size, improve};
 use crate::surface::track::project::foot;
 
-/// A mesh, and where it no longer fits.
-pub struct Unfit<'a> {
+/// A mesh after projection, and where it no longer fits its liquid.
+pub struct FlaggedMesh<'a> {
     /// Positions of vertices (m).
     pub vertices: &'a [DVec3],
     pub triangles: &'a [[u32; 3]],
     /// Vertices whose triangles are rebuilt.
     pub flags: &'a [bool],
-    /// Positions of the particles' surface that the mesh should cover, and does not (cells).
-    pub bare: &'a [DVec3],
-    /// Data for finding all other cells in which it does not fit; none: these are not searched for.
-    pub everywhere: Option<Everywhere<'a>>,
+    /// Uncovered positions of the particles' surface that the mesh should cover (cells).
+    pub uncovered: &'a [DVec3],
+    /// The check for all other cells in which it does not fit; none: it is not done.
+    pub full_check: Option<FullCheck<'a>>,
 }
 
 /// A changed mesh.
@@ -62,54 +62,58 @@ pub struct Change {
     pub flagged_cells: usize,
     /// Cells that were rebuilt.
     pub rebuilt_cells: usize,
-    /// Rebuild level: how much was rebuilt beyond those cells and what they need: 0 nothing, 1 a ring around them, 2 whole parts, 3
-    /// everything.
-    pub rung: usize,
+    /// How much was rebuilt beyond the flagged cells and those that must be rebuilt with them: 0 nothing, 1 a ring of cells around, 2 the
+    /// affected parts of the mesh, 3 everything.
+    pub rebuild_level: usize,
     /// Iterations of the matching.
     pub iterations: usize,
 }
 
 /// Maximum change of lengths where particles only jitter (spacings).
-const TREMBLE: f64 = 0.01;
-/// Where the mesh has passed through itself by less than this (cells) it is left alone: mending would lose more of it than that is worth.
-const DEEP: f64 = 0.25;
+const JITTER: f64 = 0.01;
+/// Overlaps of the mesh with itself that are shallower than this (cells) are left alone: rebuilding would lose more detail than it gains.
+const MIN_OVERLAP: f64 = 0.25;
 /// Lengths of the shortest and of the longest edge around a new vertex (cells).
-const BORN: [f64; 2] = [1.0, 1.0];
+const NEW_SIZE: [f64; 2] = [1.0, 1.0];
 
 impl Change {
     /// The change of a mesh that is removed entirely.
-    pub(in crate::surface) fn to_nothing(unfit: &Unfit<'_>) -> Self {
-        Self { before: unfit.vertices.to_vec(), ..Self::default() }
+    pub(in crate::surface) fn to_nothing(mesh: &FlaggedMesh<'_>) -> Self {
+        Self { before: mesh.vertices.to_vec(), ..Self::default() }
     }
 
     /// The change of a mesh that stays as it is.
-    fn nothing(unfit: &Unfit<'_>) -> Self {
+    fn nothing(mesh: &FlaggedMesh<'_>) -> Self {
         Self {
-            vertices: unfit.vertices.to_vec(),
-            triangles: unfit.triangles.to_vec(),
-            origins: (0..unfit.vertices.len() as u32).map(Some).collect(),
-            sources: (0..unfit.triangles.len() as u32).map(Source::Whole).collect(),
-            ..Self::to_nothing(unfit)
+            vertices: mesh.vertices.to_vec(),
+            triangles: mesh.triangles.to_vec(),
+            origins: (0..mesh.vertices.len() as u32).map(Some).collect(),
+            sources: (0..mesh.triangles.len() as u32).map(Source::Whole).collect(),
+            ..Self::to_nothing(mesh)
         }
     }
 
-    /// The change of a mesh of which cells were rebuilt.
-    fn of(unfit: &Unfit<'_>, Rebuilt { draft, cells, rung, .. }: Rebuilt, lattice: &Lattice) -> Self {
-        let own = unfit.vertices.len();
-        let (names, triangles) = compact(draft.positions.len(), &draft.triangles);
+    /// The change of a mesh that was rebuilt in some cells.
+    fn of(
+        mesh: &FlaggedMesh<'_>,
+        Rebuilt { draft, cells, rebuild_level, .. }: Rebuilt,
+        lattice: &Lattice,
+    ) -> Self {
+        let own = mesh.vertices.len();
+        let (kept, triangles) = compact(draft.positions.len(), &draft.triangles);
         let origin = DVec3::from(lattice.origin.map(f64::from));
-        let position = |name: &u32| match unfit.vertices.get(*name as usize) {
+        let position = |index: &u32| match mesh.vertices.get(*index as usize) {
             Some(position) => *position,
-            None => (draft.positions[*name as usize] + origin) * lattice.voxel,
+            None => (draft.positions[*index as usize] + origin) * lattice.voxel,
         };
         Self {
-            vertices: names.iter().map(position).collect(),
+            vertices: kept.iter().map(position).collect(),
             triangles,
-            origins: names.iter().map(|name| ((*name as usize) < own).then_some(*name)).collect(),
+            origins: kept.iter().map(|index| ((*index as usize) < own).then_some(*index)).collect(),
             sources: draft.sources,
             rebuilt_cells: cells,
-            rung,
-            ..Self::to_nothing(unfit)
+            rebuild_level,
+            ..Self::to_nothing(mesh)
         }
     }
 
@@ -124,7 +128,7 @@ impl Change {
         (0..).zip(sums).map(mean).collect()
     }
 
-    /// Count of triangles that are not unchanged old ones: new ones, and parts of old ones.
+    /// Count of new triangles, and of parts of cut ones.
     pub fn made_triangles(&self) -> usize {
         self.sources.iter().filter(|source| !matches!(source, Source::Whole(_))).count()
     }
@@ -140,7 +144,7 @@ impl Change {
         self.sources.iter_mut().for_each(|source| *source = source.after(&first.sources));
         self.flagged_cells += first.flagged_cells;
         self.rebuilt_cells += first.rebuilt_cells;
-        self.rung = self.rung.max(first.rung);
+        self.rebuild_level = self.rebuild_level.max(first.rebuild_level);
         self.before.clone_from(&first.before);
         self.iterations += first.iterations;
         self.dry += first.dry;
@@ -153,84 +157,84 @@ impl Change {
 ///
 /// # Errors
 /// Vertices too far apart for the grid; more memory than the context allows; cancel.
-pub fn change(
+pub fn rebuild(
     ctx: &Context,
-    unfit: &Unfit<'_>,
+    mesh: &FlaggedMesh<'_>,
     phi: &Implicit,
     distances: &Distances,
 ) -> Result<Option<Change>> {
     let cell = distances.cell();
-    let Some(first) = unfit.vertices.first().copied().or_else(|| Some(unfit.bare.first()? * cell)) else {
+    let Some(first) = mesh.vertices.first().copied().or_else(|| Some(mesh.uncovered.first()? * cell)) else {
         return Ok(None);
     };
-    let low = unfit.vertices.iter().fold(first, |low, position| low.inf(position));
-    let high = unfit.vertices.iter().fold(first, |high, position| high.sup(position));
+    let low = mesh.vertices.iter().fold(first, |low, position| low.inf(position));
+    let high = mesh.vertices.iter().fold(first, |high, position| high.sup(position));
     let lattice = Lattice::near(cell, 0.5 * (low + high))?;
-    let in_cells: Vec<DVec3> = unfit.vertices.iter().map(|position| lattice.to_cells(*position)).collect();
+    let in_cells: Vec<DVec3> = mesh.vertices.iter().map(|position| lattice.to_cells(*position)).collect();
     let (shape, flagged) =
-        ctx.phase("flag", || surveyed(ctx, unfit, (&in_cells, &lattice), (phi, distances)))?;
+        ctx.phase("flag", || find_unfit_cells(ctx, mesh, (&in_cells, &lattice), (phi, distances)))?;
     if flagged.count() == 0 {
         return Ok(None);
     }
     let gamma =
         ctx.phase("match", || Gamma::matched(ctx, &shape, &in_cells, &lattice, &flagged, (phi, distances)))?;
     let mut set = flagged.clone();
-    for node in gamma.turned() {
+    for node in gamma.nodes_that_changed_sides() {
         cells_at(node).into_iter().for_each(|cell| _ = set.add(cell));
     }
     let rebuilt = ctx.phase("rebuild", || ladder(ctx, &shape, (&in_cells, &lattice), &set, &gamma))?;
     let (flagged_cells, iterations) = (flagged.count(), gamma.iterations);
-    Ok(Some(Change { flagged_cells, iterations, ..Change::of(unfit, rebuilt, &lattice) }))
+    Ok(Some(Change { flagged_cells, iterations, ..Change::of(mesh, rebuilt, &lattice) }))
 }
 
-/// A mesh in the grid, at these positions (cells), and the cells in which it does not fit.
-fn surveyed(
+/// The mesh in the grid, with vertices at these positions (cells), and the cells in which it does not fit.
+fn find_unfit_cells(
     ctx: &Context,
-    unfit: &Unfit<'_>,
+    mesh: &FlaggedMesh<'_>,
     (in_cells, lattice): (&[DVec3], &Lattice),
     (phi, distances): (&Implicit, &Distances),
 ) -> Result<(Shape, CellSet)> {
     let fixed = in_cells.iter().map(|position| lattice.fix(*position)).collect::<Result<Vec<_>>>()?;
     // Some 100 bytes for each edge of the grid that the mesh pierces: up to 1.7 edges for each cell face's worth of its area.
-    let area = |names: &[u32; 3]| normal(&names.map(|name| in_cells[name as usize])).norm() / 2.0;
-    let faces: f64 = unfit.triangles.iter().map(area).sum();
+    let area = |corners: &[u32; 3]| normal(&corners.map(|corner| in_cells[corner as usize])).norm() / 2.0;
+    let faces: f64 = mesh.triangles.iter().map(area).sum();
     ctx.allow("the mesh's cells (larger ones need less)", (170.0 * faces).min(1e18) as u64)?;
-    let pierces = Pierces::of(&fixed, unfit.triangles);
-    let shape = Shape { fixed, triangles: unfit.triangles.to_vec(), pierces };
+    let pierces = Pierces::of(&fixed, mesh.triangles);
+    let shape = Shape { fixed, triangles: mesh.triangles.to_vec(), pierces };
     ctx.check()?;
-    let mut flagged = flagged(unfit, &shape, lattice);
-    if let Some(everywhere) = &unfit.everywhere {
-        everywhere.flag(ctx, &shape, (in_cells, lattice), (phi, distances), &mut flagged)?;
+    let mut flagged = cells_to_rebuild(mesh, &shape, lattice);
+    if let Some(full_check) = &mesh.full_check {
+        full_check.flag(ctx, &shape, (in_cells, lattice), (phi, distances), &mut flagged)?;
     }
     Ok((shape, flagged))
 }
 
-/// Removes parts with too few particles, improves a mesh (thesis 2.6), including where it was changed, and measures the new vertices.
-/// `sizes`, and `drifts` up to now, are those of the mesh before the change; new vertices keep a distance of at most `most` (m): anything
-/// farther from the particles' surface is no detail, and is moved there, or rebuilt again, in the next frame. None if nothing has changed.
+/// Finishes a change, or the unchanged mesh: removes parts with too few particles, improves the mesh (thesis 2.6), and measures the deltas of
+/// new vertices. `sizes` and `drifts` are those of the vertices before the change. Deltas of new vertices are clamped to `max_delta` (m):
+/// anything farther from the particles' surface is no detail; the next frame moves it nearer, or rebuilds it. None if nothing has changed.
 ///
 /// # Errors
 /// Cancel.
-pub fn improved(
+pub fn finish(
     ctx: &Context,
-    unfit: &Unfit<'_>,
+    mesh: &FlaggedMesh<'_>,
     (sizes, drifts): (&[Size], &[[f32; 3]]),
     change: Option<Change>,
     distances: &Distances,
-    crowd: &ParticleCountTest<'_>,
-    most: f64,
+    particle_count: &ParticleCountTest<'_>,
+    max_delta: f64,
 ) -> Result<Option<Change>> {
     let mut is_changed = change.is_some();
     let cell = distances.cell();
-    let mut change = change.unwrap_or_else(|| Change::nothing(unfit));
-    [change.dry, change.specks] = ctx.phase("dry", || Ok(change.drop_dry(crowd)))?;
+    let mut change = change.unwrap_or_else(|| Change::nothing(mesh));
+    [change.dry, change.specks] = ctx.phase("dry", || Ok(change.drop_dry(particle_count)))?;
     is_changed |= change.dry + change.specks > 0;
-    let born = BORN.map(|share| (share * cell) as f32);
-    change.sizes = change.origins.iter().map(|at| at.map_or(born, |at| sizes[at as usize])).collect();
+    let new_size = NEW_SIZE.map(|share| (share * cell) as f32);
+    change.sizes = change.origins.iter().map(|at| at.map_or(new_size, |at| sizes[at as usize])).collect();
     change.drifts = change.origins.iter().map(|at| at.map_or([0.0; 3], |at| drifts[at as usize])).collect();
     let mut flags: Vec<bool> =
-        change.origins.iter().map(|at| at.is_some_and(|at| unfit.flags[at as usize])).collect();
-    let mut mesh = Improvable {
+        change.origins.iter().map(|at| at.is_some_and(|at| mesh.flags[at as usize])).collect();
+    let mut improvable = Improvable {
         positions: &mut change.vertices,
         triangles: &mut change.triangles,
         sizes: &mut change.sizes,
@@ -238,36 +242,37 @@ pub fn improved(
         origins: &mut change.origins,
         sources: &mut change.sources,
         flags: &mut flags,
-        tremble: TREMBLE * crowd.spacing,
+        jitter: JITTER * particle_count.spacing,
     };
-    change.improvements = ctx.phase("improve", || improve(ctx, &mut mesh))?;
+    change.improvements = ctx.phase("improve", || improve(ctx, &mut improvable))?;
     if !is_changed && change.improvements == Improvements::default() {
         return Ok(None);
     }
     let mut sampler = Sampler::new(distances);
-    let made = change.vertices.iter().zip(&change.origins).filter(|(_, origin)| origin.is_none());
+    let new_vertices = change.vertices.iter().zip(&change.origins).filter(|(_, origin)| origin.is_none());
     let mut distance = |position: DVec3| match foot(&mut sampler, position) {
         Some(foot) => foot.distance,
         None => sampler.at(position).map_or(0.0, |(distance, _)| f64::from(distance)),
     };
-    change.delta =
-        made.map(|(position, _)| (distance(*position / cell) * cell).clamp(-most, most) as f32).collect();
+    change.delta = new_vertices
+        .map(|(position, _)| (distance(*position / cell) * cell).clamp(-max_delta, max_delta) as f32)
+        .collect();
     Ok(Some(change))
 }
 
-/// The cells in which the mesh does not fit: those of triangles around flagged vertices, those of the positions that it should cover, and
-/// those in which it has passed through itself.
-fn flagged(unfit: &Unfit<'_>, shape: &Shape, lattice: &Lattice) -> CellSet {
+/// The cells with triangles around flagged vertices, those with positions that the mesh should cover, and those in which it has passed
+/// through itself.
+fn cells_to_rebuild(mesh: &FlaggedMesh<'_>, shape: &Shape, lattice: &Lattice) -> CellSet {
     let mut set = CellSet::default();
-    for (triangle, names) in (0..).zip(unfit.triangles) {
-        if names.iter().any(|name| unfit.flags[*name as usize]) {
+    for (triangle, corners) in (0..).zip(mesh.triangles) {
+        if corners.iter().any(|corner| mesh.flags[*corner as usize]) {
             shape.cells_of(triangle).into_iter().for_each(|cell| _ = set.add(cell));
         }
     }
-    for position in unfit.bare {
+    for position in mesh.uncovered {
         set.add(plus(cell_of(position), lattice.origin.map(|at| -at)));
     }
-    overlaps(shape, DEEP, &mut set);
+    overlaps(shape, MIN_OVERLAP, &mut set);
     set
 }
 

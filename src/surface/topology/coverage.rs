@@ -1,8 +1,8 @@
-//! Positions of the particles' surface that the mesh does not cover, on parts that it covers elsewhere: a bridge that has just grown between
-//! two bodies, the rim of a hole. They reveal a change before a vertex jumps there. The thesis (2.3.3) has no such early test: a thread that
-//! forms between vertices moves none of them.
+//! Uncovered positions of the particles' surface, on connected parts that the mesh covers elsewhere: a bridge that has just grown between two
+//! bodies, the rim of a hole. They reveal a change before a vertex jumps there. The thesis (2.3.3) has no such early test: it misses a thread
+//! that forms between vertices, as that moves none of them.
 //!
-//! The surface is covered by the mesh of the feet: each vertex without its detail. Where nothing changes, that mesh lies on the surface.
+//! The surface is covered by the triangles of feet. Where nothing changes, these lie on it.
 
 use std::collections::HashMap;
 
@@ -22,8 +22,8 @@ use crate::surface::pieces::in_pieces;
 /// A position of the surface is covered if a triangle of feet is within this distance (spacings; a cell at least).
 const SLACK: f64 = 0.5;
 /// A vertex is beside an uncovered position if its foot is within this distance of it (spacings; two cells at least).
-const BESIDE: f64 = 1.0;
-/// Factor by which `BESIDE` is larger at the first frame. Gaps of that frame are no change, but their size seems to vary slightly as the
+const NEAR: f64 = 1.0;
+/// Factor on `NEAR` at the first frame. Gaps of that frame are not reported as changes, not even if they seem slightly larger later, as the
 /// surface moves through the grid.
 const FIRST: f64 = 2.0;
 /// A triangle of feet that spans more bins than this on an axis does not lie on the surface.
@@ -31,7 +31,7 @@ const LONG: f64 = 1024.0;
 /// Vertices, positions or triangles between two checks for a cancel.
 const GRAIN: usize = 2048;
 
-/// The mesh without its detail, on the particles' surface.
+/// The triangles of feet: the mesh without its detail, on the particles' surface.
 pub struct Cover<'a> {
     /// The foot of each vertex (cells), if it has one.
     pub feet: &'a [Option<DVec3>],
@@ -47,37 +47,38 @@ impl Cover<'_> {
     ///
     /// # Errors
     /// Cancel.
-    pub fn beside_bare(
+    pub fn beside_uncovered(
         &self,
         ctx: &Context,
         phi: &Implicit,
         surface: &Isosurface,
         parts: &Parts,
     ) -> Result<(Vec<bool>, Vec<DVec3>)> {
-        let mut trodden = Marks::default();
-        self.feet.iter().flatten().for_each(|foot| trodden.set(cell_of(foot)));
+        let mut with_feet = Marks::default();
+        self.feet.iter().flatten().for_each(|foot| with_feet.set(cell_of(foot)));
         ctx.check()?;
-        let bare = self.bare(ctx, &doubtful(phi, surface, parts, &trodden))?;
+        let uncovered = self.uncovered(ctx, &candidates(phi, surface, parts, &with_feet))?;
         let reach = self.reach();
-        let items = bare.iter().zip(0..).map(|(position, index)| (bin_of(position, reach), index)).collect();
+        let items =
+            uncovered.iter().zip(0..).map(|(position, index)| (bin_of(position, reach), index)).collect();
         let bins = Bins::new(reach, items);
         let is_beside = |foot: &Option<DVec3>| {
             let foot = foot.as_ref()?;
-            let mut near = bins.near(foot).map(|position| (bare[position as usize] - foot).norm());
+            let mut near = bins.near(foot).map(|position| (uncovered[position as usize] - foot).norm());
             near.any(|distance| distance <= reach).then_some(())
         };
         let are_beside =
             |_, feet: &[Option<DVec3>]| feet.iter().map(|foot| is_beside(foot).is_some()).collect();
-        Ok((in_pieces(ctx, self.feet, GRAIN, are_beside)?, bare))
+        Ok((in_pieces(ctx, self.feet, GRAIN, are_beside)?, uncovered))
     }
 
     /// Maximum distance of a vertex' foot from an uncovered position beside it (cells).
     pub fn reach(&self) -> f64 {
-        (BESIDE * self.spacing).max(2.0) * if self.is_first { FIRST } else { 1.0 }
+        (NEAR * self.spacing).max(2.0) * if self.is_first { FIRST } else { 1.0 }
     }
 
     /// Those positions (cells) that are near no triangle of feet.
-    fn bare(&self, ctx: &Context, positions: &[DVec3]) -> Result<Vec<DVec3>> {
+    fn uncovered(&self, ctx: &Context, positions: &[DVec3]) -> Result<Vec<DVec3>> {
         if positions.is_empty() {
             return Ok(Vec::new());
         }
@@ -99,11 +100,11 @@ impl Cover<'_> {
             out
         };
         let bins = Bins::new(slack, in_pieces(ctx, self.triangles, GRAIN, in_bins)?);
-        let is_bare = |position: &DVec3| {
+        let is_uncovered = |position: &DVec3| {
             !bins.near(position).any(|triangle| self.distance(triangle, position) <= slack)
         };
         in_pieces(ctx, positions, GRAIN, |_, positions| {
-            positions.iter().filter(|position| is_bare(position)).copied().collect()
+            positions.iter().filter(|position| is_uncovered(position)).copied().collect()
         })
     }
 
@@ -120,11 +121,11 @@ impl Cover<'_> {
     }
 }
 
-/// Corners of the surface's triangles (cells), on parts that have feet, in cells without any.
-fn doubtful(phi: &Implicit, surface: &Isosurface, parts: &Parts, trodden: &Marks) -> Vec<DVec3> {
+/// Vertices of the surface (cells) that may be uncovered: on parts that have feet, in cells without any.
+fn candidates(phi: &Implicit, surface: &Isosurface, parts: &Parts, with_feet: &Marks) -> Vec<DVec3> {
     let position = |vertex: u32| {
         let position = surface.in_cells(phi, vertex);
-        (parts.is_covered(vertex) && !trodden.has(cell_of(&position))).then_some(position)
+        (parts.is_covered(vertex) && !with_feet.has(cell_of(&position))).then_some(position)
     };
     (0..surface.vertices() as u32).into_par_iter().with_min_len(4096).filter_map(position).collect()
 }

@@ -1,4 +1,4 @@
-//! Removes parts of the mesh without liquid, crumbs left where it disappeared, and parts with too little of it.
+//! Removes parts of the mesh that contain no or too few particles, such as crumbs left where the liquid disappeared.
 
 use super::change::Change;
 use super::particle_count::{Bounds, ParticleCountTest, are_inside, seen_from};
@@ -9,9 +9,9 @@ use crate::geometry::mesh::{compact, drop_marked};
 use crate::geometry::shape::six_volumes;
 
 impl Change {
-    /// Removes the parts of the mesh with a volume over 0 that hold too few particles, and the hollows in them. Returns the count of those
-    /// that held none, and of those that held some; hollows are not counted. A mesh of one part stays.
-    pub(in crate::surface) fn drop_dry(&mut self, crowd: &ParticleCountTest<'_>) -> [usize; 2] {
+    /// Removes the parts of the mesh with a volume over 0 that contain too few particles, and the hollows in them. Returns the count of
+    /// parts that contained none, and of those that contained some; hollows are not counted. A mesh of one part stays.
+    pub(in crate::surface) fn drop_dry(&mut self, particle_count: &ParticleCountTest<'_>) -> [usize; 2] {
         // Mostly there is only one.
         if topology::parts(self.vertices.len(), &self.triangles) < 2 {
             return [0; 2];
@@ -31,14 +31,15 @@ impl Change {
             let corners: Vec<[DVec3; 3]> = self.corners(&parts[at]).collect();
             seen_from(bounds[at][0], &corners)
         };
-        let counts = crowd.held(&bounds, mesh);
-        let out: Vec<usize> = (0..parts.len()).filter(|part| counts[*part] < crowd.least).collect();
+        let counts = particle_count.counts(&bounds, mesh);
+        let out: Vec<usize> =
+            (0..parts.len()).filter(|part| counts[*part] < particle_count.min_count).collect();
         let mut gone = [0; 2];
         out.iter().for_each(|part| gone[usize::from(counts[*part] > 0)] += 1);
         if gone == [0; 2] {
             return gone;
         }
-        // Parts do not intersect, so one corner is enough. A part within one with too few particles has too few, too.
+        // Parts do not intersect, so one corner shows in which part a hollow lies. If a removed part contains another, that is removed too.
         let corners = hollows.iter().filter_map(|hollow| self.corners(hollow).next());
         let firsts: Vec<DVec3> = corners.map(|[first, ..]| first).collect();
         let out_bounds: Vec<Bounds> = out.iter().map(|part| bounds[*part]).collect();
@@ -50,10 +51,10 @@ impl Change {
         }
         drop_marked(&mut self.triangles, &is_out);
         drop_marked(&mut self.sources, &is_out);
-        let (names, triangles) = compact(self.vertices.len(), &self.triangles);
+        let (kept, triangles) = compact(self.vertices.len(), &self.triangles);
         self.triangles = triangles;
-        self.vertices = names.iter().map(|name| self.vertices[*name as usize]).collect();
-        self.origins = names.iter().map(|name| self.origins[*name as usize]).collect();
+        self.vertices = kept.iter().map(|vertex| self.vertices[*vertex as usize]).collect();
+        self.origins = kept.iter().map(|vertex| self.origins[*vertex as usize]).collect();
         gone
     }
 
@@ -93,8 +94,8 @@ mod tests {
 
     /// A ball, from which a drop of 4 particles flies one way and a drop of 20 the other, and the centres of these drops.
     fn splash(frame: i32) -> (Particles, [DVec3; 2]) {
-        let way = 3.6 + 0.25 * f64::from(frame);
-        let [small, large] = [DVec3::new(way, 0.4, 0.4), DVec3::new(-way - 4.0, 0.4, 0.4)];
+        let distance = 3.6 + 0.25 * f64::from(frame);
+        let [small, large] = [DVec3::new(distance, 0.4, 0.4), DVec3::new(-distance - 4.0, 0.4, 0.4)];
         let ball = shell(DVec3::zeros(), 0.0, 4.5);
         let four = lattice(small, [2, 2, 1]);
         let twenty = lattice(large, [5, 2, 2]);
@@ -103,7 +104,7 @@ mod tests {
         (numbered(positions), middles)
     }
 
-    /// Follows it to the end: the count of specks removed, and the counts of vertices at both drops in each of the last frames.
+    /// Tracks the splash to its end: the count of specks removed, and the counts of vertices at both drops in each of the last frames.
     fn followed(min_drop: usize) -> (usize, Vec<[usize; 2]>) {
         let ctx = context(2);
         let mut from = splash(0).0;

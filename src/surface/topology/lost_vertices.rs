@@ -1,5 +1,5 @@
-//! Vertices that have lost the surface: particles that fly apart carry them far away, and the triangles between would be spikes through
-//! everything else. Where the mesh is rebuilt anyway, they follow the vertices around them instead.
+//! Vertices that have lost the surface. Particles that fly apart carry them far away, and their triangles would become spikes through the
+//! rest of the mesh. If the mesh is rebuilt, they follow the vertices around them instead.
 
 use crate::geometry::DVec3;
 

@@ -28,7 +28,7 @@ const BYTES: usize = VOXELS * (2 * 4 + 2 * 28);
 /// What needs the memory, for messages.
 const WHAT: &str = "the mesh's change (larger cells need less)";
 /// Minimum distance of a node from the mesh (cells), so that it is inside or outside.
-const LEAST: f32 = 1e-6;
+const MIN_MAGNITUDE: f32 = 1e-6;
 /// All nodes of a block.
 const ALL: [u64; DIM] = [u64::MAX; DIM];
 
@@ -97,7 +97,7 @@ impl<'a> Gamma<'a> {
             for at in 0..VOXELS {
                 let position = node(*block, at);
                 let phi = known.map_or_else(|| far(phi, distances.reach(), there, at), |values| values[at]);
-                let size = own[slot][at].clamp(LEAST, KNOWN);
+                let size = own[slot][at].clamp(MIN_MAGNITUDE, KNOWN);
                 let gamma = if shape.pierces.winding(position) > 0 { -size } else { size };
                 let is_flagged = cells_at(position).into_iter().any(|cell| flagged.holds(cell));
                 nodes.push(Node { position, gamma, phi, is_flagged });
@@ -130,7 +130,7 @@ impl<'a> Gamma<'a> {
     }
 
     /// Nodes that changed sides.
-    pub fn turned(&self) -> impl Iterator<Item = Coord> + '_ {
+    pub fn nodes_that_changed_sides(&self) -> impl Iterator<Item = Coord> + '_ {
         self.blocks.iter().flat_map(|block| (0..VOXELS).map(move |at| node(*block, at))).filter(|node| {
             self.changed(*node).is_some_and(|gamma| (gamma < 0.0) != (self.shape.pierces.winding(*node) > 0))
         })

@@ -1,7 +1,7 @@
 //! Count of particles in closed parts of a surface: drops, crumbs.
 //!
-//! The particles' surface passes close to the particles of small drops, and some of them lie outside it: of 20 at random positions 10 to 14
-//! lie inside, nearly all others less than half a spacing from it. So those beside a part count too, if any lies inside.
+//! The surface of a small drop passes close to its particles, and some of them lie outside it: of 20 at random positions 10 to 14 lie
+//! inside, and nearly all others less than half a spacing outside. So if any lies inside, those beside the part count too.
 
 use crate::geometry::check::deviation::NearestTree;
 use crate::geometry::coords::{between, cell_of};
@@ -12,36 +12,37 @@ use crate::geometry::{Coord, DVec3, TriMesh};
 const ASLANT: DVec3 = DVec3::new(0.5773, 0.6533, 0.4896);
 /// Maximum distance of a particle that is beside a part (spacings).
 const BESIDE: f64 = 0.5;
-/// Ratio of the longest to the shortest part in bins of one size.
+/// Maximum ratio of the lengths of parts that are listed in bins of the same size.
 const SPREAD: f64 = 4.0;
 
 /// Minimum and maximum position of a part.
 pub type Bounds = [DVec3; 2];
 
-/// Particles, of which a part of the mesh must hold a minimum count.
+/// The test whether parts of a surface contain a minimum count of particles.
 #[derive(Debug, Clone, Copy)]
 pub struct ParticleCountTest<'a> {
-    /// Their positions (m).
+    /// Positions of the particles (m).
     pub positions: &'a [DVec3],
-    /// Initial distance between them (m).
+    /// Initial distance between particles (m).
     pub spacing: f64,
     /// Minimum count in a part, at least 1.
-    pub least: usize,
+    pub min_count: usize,
 }
 
 impl ParticleCountTest<'_> {
-    /// Count of particles in each of some closed parts, given by their bounds (m), counted up to [`ParticleCountTest::least`]: 0 if none lies inside,
-    /// else those inside and beside it. `mesh` gives a part's triangles, turned outward, with positions relative to its minimum corner; it
-    /// is called for parts that particles come near.
-    pub fn held(&self, parts: &[Bounds], mesh: impl Fn(usize) -> TriMesh) -> Vec<usize> {
+    /// Count of particles in each of some closed parts, given by their bounds (m), up to [`ParticleCountTest::min_count`]: 0 if none lies
+    /// inside, else those inside and beside it. `mesh` returns a part's triangles, oriented outward, with positions relative to its minimum
+    /// corner; it is called only for parts with particles in or near their bounds.
+    pub fn counts(&self, parts: &[Bounds], mesh: impl Fn(usize) -> TriMesh) -> Vec<usize> {
         let mut trees: Vec<Option<Bvh>> = Vec::new();
         trees.resize_with(parts.len(), || None);
-        let mut counts = count(parts, self.positions, &vec![self.least; parts.len()], |part, position| {
-            let tree = trees[part].get_or_insert_with(|| Bvh::new(&mesh(part)));
-            tree.surrounding(position - parts[part][0], ASLANT) > 0
-        });
-        let lacking = |count: &usize| if *count == 0 { 0 } else { self.least - count };
-        let lacking: Vec<usize> = counts.iter().map(lacking).collect();
+        let mut counts =
+            count(parts, self.positions, &vec![self.min_count; parts.len()], |part, position| {
+                let tree = trees[part].get_or_insert_with(|| Bvh::new(&mesh(part)));
+                tree.surrounding(position - parts[part][0], ASLANT) > 0
+            });
+        let limits = |count: &usize| if *count == 0 { 0 } else { self.min_count - count };
+        let limits: Vec<usize> = counts.iter().map(limits).collect();
         let margin = BESIDE * self.spacing;
         let wider: Vec<Bounds> = parts
             .iter()
@@ -49,7 +50,7 @@ impl ParticleCountTest<'_> {
             .collect();
         let mut surfaces: Vec<Option<NearestTree>> = Vec::new();
         surfaces.resize_with(parts.len(), || None);
-        let beside = count(&wider, self.positions, &lacking, |part, position| {
+        let beside = count(&wider, self.positions, &limits, |part, position| {
             let seen = position - parts[part][0];
             let surface = surfaces[part].get_or_insert_with(|| NearestTree::new(&mesh(part)));
             let is_near = surface.nearest(seen).is_some_and(|nearest| nearest.distance <= margin);
@@ -60,15 +61,15 @@ impl ParticleCountTest<'_> {
     }
 }
 
-/// Counts the positions within the bounds of each part that belong to it, up to as many as it lacks.
+/// Counts the positions within the bounds of each part that belong to it, up to its limit.
 fn count(
     parts: &[Bounds],
     positions: &[DVec3],
-    lacking: &[usize],
+    limits: &[usize],
     mut is_of: impl FnMut(usize, DVec3) -> bool,
 ) -> Vec<usize> {
     let mut counts = vec![0; parts.len()];
-    let mut all = Bins::of(parts, (0..parts.len()).filter(|part| lacking[*part] > 0).collect());
+    let mut all = Bins::of(parts, (0..parts.len()).filter(|part| limits[*part] > 0).collect());
     for position in positions {
         if all.is_empty() {
             break;
@@ -76,15 +77,15 @@ fn count(
         for bins in &mut all {
             let mut full = 0;
             for part in bins.near(position) {
-                if counts[part] < lacking[part] && is_within(&parts[part], position) && is_of(part, *position)
+                if counts[part] < limits[part] && is_within(&parts[part], position) && is_of(part, *position)
                 {
                     counts[part] += 1;
-                    full += usize::from(counts[part] == lacking[part]);
+                    full += usize::from(counts[part] == limits[part]);
                 }
             }
             bins.open -= full;
             if 2 * bins.open <= bins.parts {
-                bins.listed.retain(|(_, part)| counts[*part] < lacking[*part]);
+                bins.listed.retain(|(_, part)| counts[*part] < limits[*part]);
                 bins.parts = bins.open;
             }
         }
@@ -93,7 +94,7 @@ fn count(
     counts
 }
 
-/// Parts of similar size, in the bins that their bounds touch: up to 8 each.
+/// Parts of similar length, listed in the bins that their bounds touch: up to 8 for each part.
 struct Bins {
     /// Edge of a bin (m): as long as the longest part.
     edge: f64,
@@ -101,21 +102,21 @@ struct Bins {
     listed: Vec<(Coord, usize)>,
     /// Count of listed parts.
     parts: usize,
-    /// Count of those that still lack particles.
+    /// Count of those that have not reached their limit.
     open: usize,
 }
 
 impl Bins {
-    /// Bins for these parts: a few sets, from small to large sizes.
+    /// Sets of bins for these parts, from short to long ones.
     fn of(bounds: &[Bounds], mut parts: Vec<usize>) -> Vec<Self> {
         let length = |part: usize| (bounds[part][1] - bounds[part][0]).max();
         parts.sort_by(|a, b| length(*a).total_cmp(&length(*b)));
         let mut all = Vec::new();
         let mut rest = &parts[..];
         while let [first, ..] = rest {
-            let most = SPREAD * length(*first);
+            let max_length = SPREAD * length(*first);
             // At least one, even if lengths are not finite.
-            let count = rest.partition_point(|part| length(*part) <= most).max(1);
+            let count = rest.partition_point(|part| length(*part) <= max_length).max(1);
             let (own, longer) = rest.split_at(count);
             let edge = length(own[count - 1]);
             let bin = |position: DVec3| cell_of(&(position / edge));
@@ -133,7 +134,7 @@ impl Bins {
         all
     }
 
-    /// The parts in the bin of a position: all whose bounds contain it, and others.
+    /// The parts in the bin of a position, among them all whose bounds contain it.
     fn near(&self, position: &DVec3) -> impl Iterator<Item = usize> {
         // Division is monotone: a position between two others stays between them.
         let bin = cell_of(&(position / self.edge));
@@ -142,7 +143,7 @@ impl Bins {
     }
 }
 
-/// Which positions (m) lie inside any of some closed parts, given by their bounds (m); `mesh` as for [`ParticleCountTest::held`].
+/// Which positions (m) lie inside any of some closed parts, given by their bounds (m); `mesh` as for [`ParticleCountTest::counts`].
 pub fn are_inside(positions: &[DVec3], parts: &[Bounds], mesh: impl Fn(usize) -> TriMesh) -> Vec<bool> {
     let mut are = vec![false; positions.len()];
     for (part, bounds) in parts.iter().enumerate() {
@@ -172,7 +173,7 @@ mod tests {
     use super::*;
 
     /// Counts of particles in a hundred cubes with an edge of 1 along a line, and in a box that contains them all.
-    fn held(positions: &[DVec3], spacing: f64, least: usize) -> Vec<usize> {
+    fn in_cubes(positions: &[DVec3], spacing: f64, min_count: usize) -> Vec<usize> {
         let mut parts: Vec<Bounds> = (0..100)
             .map(|n| DVec3::new(3.0 * f64::from(n), 0.0, 0.0))
             .map(|low| [low, low + DVec3::repeat(1.0)])
@@ -182,7 +183,7 @@ mod tests {
             100 => TriMesh::cuboid([0.0; 3], [401.0, 3.0, 3.0]),
             _ => TriMesh::cuboid([0.0; 3], [1.0; 3]),
         };
-        ParticleCountTest { positions, spacing, least }.held(&parts, mesh)
+        ParticleCountTest { positions, spacing, min_count }.counts(&parts, mesh)
     }
 
     fn middle(n: u32) -> DVec3 {
@@ -195,10 +196,10 @@ mod tests {
         let mut positions: Vec<DVec3> = (0..100).filter(|n| n % 2 == 0).map(middle).collect();
         positions.extend((0..100).filter(|n| n % 10 == 0).map(|n| middle(n) + DVec3::repeat(0.1)));
         positions.extend([DVec3::new(1.6, 0.5, 0.5), DVec3::new(0.5, 9.0, 0.5)]);
-        for least in [1, 2, 100] {
-            for (n, count) in held(&positions, 1.0, least).into_iter().enumerate() {
+        for min_count in [1, 2, 100] {
+            for (n, count) in in_cubes(&positions, 1.0, min_count).into_iter().enumerate() {
                 let all = if n == 100 { 61 } else { usize::from(n % 2 == 0) + usize::from(n % 10 == 0) };
-                assert_eq!(count, all.min(least), "part {n} up to {least}");
+                assert_eq!(count, all.min(min_count), "part {n} up to {min_count}");
             }
         }
     }
@@ -219,11 +220,11 @@ mod tests {
         // Some exactly on the bounds.
         let mut positions: Vec<DVec3> = (0..3000).map(|_| any(44.0) - DVec3::repeat(22.0)).collect();
         positions.extend(parts.as_flattened());
-        let lacking: Vec<usize> = (0..parts.len()).map(|n| n % 3 * 5).collect();
-        let counts = count(&parts, &positions, &lacking, |part, _| part != 7);
+        let limits: Vec<usize> = (0..parts.len()).map(|n| n % 3 * 5).collect();
+        let counts = count(&parts, &positions, &limits, |part, _| part != 7);
         for (n, bounds) in parts.iter().enumerate() {
             let all = positions.iter().filter(|position| n != 7 && is_within(bounds, position)).count();
-            assert_eq!(counts[n], all.min(lacking[n]), "part {n}: {bounds:?}");
+            assert_eq!(counts[n], all.min(limits[n]), "part {n}: {bounds:?}");
         }
     }
 
@@ -243,9 +244,9 @@ mod tests {
         // Above the first cube and above the second; inside the first only.
         let above = |n: u32, by: f64| middle(n) + DVec3::new(0.0, 0.55 + by, 0.0);
         let positions = [above(0, 0.4), middle(0), above(0, 0.6), above(1, 0.4), above(0, 0.1)];
-        let counts = held(&positions, 1.0, 8);
+        let counts = in_cubes(&positions, 1.0, 8);
         assert_eq!([counts[0], counts[1], counts[2]], [3, 0, 0]);
-        assert_eq!(held(&positions, 0.5, 8)[0], 2);
-        assert_eq!(held(&positions, 1.0, 2)[0], 2);
+        assert_eq!(in_cubes(&positions, 0.5, 8)[0], 2);
+        assert_eq!(in_cubes(&positions, 1.0, 2)[0], 2);
     }
 }

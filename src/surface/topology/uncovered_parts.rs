@@ -1,4 +1,4 @@
-//! Parts of the particles' surface that the mesh does not cover: drops that have flown off, bubbles inside. They have no vertices.
+//! Connected parts of the particles' surface on which no vertex has its foot: drops that have flown off, bubbles inside.
 
 use rayon::prelude::*;
 
@@ -10,10 +10,10 @@ use crate::geometry::{Coord, DVec3};
 use crate::surface::level_set::implicit::Implicit;
 use crate::surface::level_set::isosurface::Isosurface;
 
-/// A part of the particles' surface on which no vertex of the mesh lies.
+/// A connected part of the particles' surface on which no vertex of the mesh has its foot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UncoveredPart {
-    /// Centre: the mean of its corners (m).
+    /// Centre: the mean of its triangles' corners (m).
     pub position: DVec3,
     /// Enclosed volume (m3); negative: a bubble.
     pub volume: f64,
@@ -24,10 +24,10 @@ pub struct UncoveredPart {
 /// Which of the uncovered parts a mesh should cover.
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted<'a> {
-    /// Drops: those that hold enough of these particles; if one is enough, all.
-    pub crowd: ParticleCountTest<'a>,
+    /// Drops: those with at least the minimum count of particles; if that is 1, all.
+    pub particle_count: ParticleCountTest<'a>,
     /// Bubbles: those of at least this volume (cells^3), but none in drops that are too small; infinite: none at all.
-    pub bubble: f64,
+    pub min_bubble: f64,
 }
 
 /// Missing parts of a mesh.
@@ -39,7 +39,7 @@ pub struct MissingParts {
     pub specks: Vec<Bounds>,
 }
 
-/// Of a part: its triangles, their first corner (cells), the sum of their corners, and six times the volume.
+/// Sums over the triangles of a part: their count, the first corner (cells), the sum of corners, and six times the volume.
 #[derive(Clone, Default)]
 struct Sum {
     triangles: usize,
@@ -83,20 +83,20 @@ impl Parts {
     }
 
     /// The uncovered parts that the mesh should cover.
-    pub fn lacking(&self, phi: &Implicit, surface: &Isosurface, wanted: &Wanted<'_>) -> MissingParts {
+    pub fn missing(&self, phi: &Implicit, surface: &Isosurface, wanted: &Wanted<'_>) -> MissingParts {
         if self.is_covered.iter().all(|covered| *covered) {
             return MissingParts::default();
         }
         let sums = self.sums(phi, surface);
-        let is_in = |sum: &Sum| sum.triangles > 0 && (sum.six > 0.0 || -sum.six / 6.0 >= wanted.bubble);
+        let is_in = |sum: &Sum| sum.triangles > 0 && (sum.six > 0.0 || -sum.six / 6.0 >= wanted.min_bubble);
         let mut is_wanted: Vec<bool> = sums.iter().map(is_in).collect();
         let mut specks = Vec::new();
-        if wanted.crowd.least > 1 {
+        if wanted.particle_count.min_count > 1 {
             let (drops, bubbles): (Vec<usize>, Vec<usize>) =
                 (0..sums.len()).filter(|part| is_wanted[*part]).partition(|part| sums[*part].six > 0.0);
             let bubbles: Vec<(usize, DVec3)> =
                 bubbles.into_iter().map(|part| (part, sums[part].first * phi.cell())).collect();
-            let (unwanted, bounds) = self.specks(phi, surface, (&drops, &bubbles), &wanted.crowd);
+            let (unwanted, bounds) = self.specks(phi, surface, (&drops, &bubbles), &wanted.particle_count);
             unwanted.into_iter().for_each(|part| is_wanted[part] = false);
             specks = bounds;
         }
@@ -105,14 +105,15 @@ impl Parts {
         MissingParts { positions, specks }
     }
 
-    /// Those of `drops` (ascending) that hold too few particles, and those of `bubbles` (each with a position (m) on it) that lie in such a
-    /// drop; also the bounds (cells) of these drops. The particles in the meshes that they would get are counted in the same way.
+    /// Those of `drops` (ascending) that contain too few particles, and those of `bubbles` (each with a position (m) on it) that lie in such
+    /// a drop; also the bounds (cells) of these drops. `Change::drop_dry` counts in the same way: a mesh made for
+    /// a drop is not removed again.
     fn specks(
         &self,
         phi: &Implicit,
         surface: &Isosurface,
         (drops, bubbles): (&[usize], &[(usize, DVec3)]),
-        crowd: &ParticleCountTest<'_>,
+        particle_count: &ParticleCountTest<'_>,
     ) -> (Vec<usize>, Vec<Bounds>) {
         let mut triangles: Vec<Vec<[DVec3; 3]>> = vec![Vec::new(); drops.len()];
         for triangle in surface.runs().flat_map(|(_, triangles)| triangles) {
@@ -124,8 +125,9 @@ impl Parts {
         let bounds: Vec<Bounds> =
             triangles.iter().map(|triangles| bounds(triangles.as_flattened()).into()).collect();
         let mesh = |slot: usize| seen_from(bounds[slot][0], &triangles[slot]);
-        let counts = crowd.held(&bounds, mesh);
-        let few: Vec<usize> = (0..drops.len()).filter(|slot| counts[*slot] < crowd.least).collect();
+        let counts = particle_count.counts(&bounds, mesh);
+        let few: Vec<usize> =
+            (0..drops.len()).filter(|slot| counts[*slot] < particle_count.min_count).collect();
         let few_bounds: Vec<Bounds> = few.iter().map(|slot| bounds[*slot]).collect();
         let positions: Vec<DVec3> = bubbles.iter().map(|(_, position)| *position).collect();
         let are_in = are_inside(&positions, &few_bounds, |at| mesh(few[at]));
@@ -135,7 +137,7 @@ impl Parts {
         (parts, few_bounds.into_iter().map(in_cells).collect())
     }
 
-    /// The sums of each part; without triangles where the mesh covers it.
+    /// The sums of each part; those of a covered part are empty.
     fn sums(&self, phi: &Implicit, surface: &Isosurface) -> Vec<Sum> {
         let mut sums = vec![Sum::default(); self.is_covered.len()];
         for triangle in surface.runs().flat_map(|(_, triangles)| triangles) {
@@ -156,7 +158,7 @@ impl Parts {
     }
 
     /// The parts that the mesh does not cover, the largest first.
-    pub fn apart(&self, phi: &Implicit, surface: &Isosurface) -> Vec<UncoveredPart> {
+    pub fn uncovered(&self, phi: &Implicit, surface: &Isosurface) -> Vec<UncoveredPart> {
         if self.is_covered.iter().all(|covered| *covered) {
             return Vec::new();
         }

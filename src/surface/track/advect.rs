@@ -16,7 +16,7 @@ use crate::geometry::coords::nodes_of;
 use crate::geometry::{Coord, DVec3};
 use crate::surface::Particles;
 use crate::surface::params::{Params, Weighting};
-use crate::surface::particles::affine_fit::{Map, Near, Sums, sums};
+use crate::surface::particles::affine_fit::{AffineMap, Near, Sums, sums};
 use crate::surface::particles::grid::Cells;
 use crate::surface::particles::paths::Paths;
 
@@ -27,7 +27,7 @@ const MAP_RADIUS: f32 = 3.0;
 /// Maximum displacement in one part of a frame (spacings).
 const STEP: f64 = 1.0;
 /// Maximum number of parts of a frame.
-const MOST: usize = 64;
+const MAX_PARTS: usize = 64;
 /// How often the radius is doubled where no particle is near.
 const DOUBLINGS: u32 = 8;
 /// Farthest cell.
@@ -76,7 +76,7 @@ pub fn advect(
     spacing: f64,
     weighting: Weighting,
 ) -> Result<usize> {
-    let parts = (paths.farthest() / (STEP * spacing)).ceil().clamp(1.0, MOST as f64) as usize;
+    let parts = (paths.farthest() / (STEP * spacing)).ceil().clamp(1.0, MAX_PARTS as f64) as usize;
     if paths.count() == 0 {
         return Ok(parts);
     }
@@ -86,11 +86,11 @@ pub fn advect(
     for part in 1..=parts {
         paths.at(part as f64 / parts as f64, &mut to);
         let cells = Cells::new(&from, 2.0 * spacing, |path| paths.rank(path))?;
-        let ways = cells.order.par_iter().with_min_len(4096).map(|path| {
-            let way = (to[*path as usize] - from[*path as usize]) / spacing;
-            [way.x as f32, way.y as f32, way.z as f32]
+        let displacements = cells.order.par_iter().with_min_len(4096).map(|path| {
+            let displacement = (to[*path as usize] - from[*path as usize]) / spacing;
+            [displacement.x as f32, displacement.y as f32, displacement.z as f32]
         });
-        let field = Field { cells: &cells, ways: ways.collect(), spacing };
+        let field = Field { cells: &cells, displacements: displacements.collect(), spacing };
         match weighting {
             Weighting::Affine => field.carry_by_maps(ctx, vertices, &mut order)?,
             Weighting::Mean => field.carry_by_means(ctx, vertices, &mut order)?,
@@ -104,7 +104,7 @@ pub fn advect(
 struct Field<'a> {
     cells: &'a Cells,
     /// Displacements in the order of cells (spacings).
-    ways: Vec<[f32; 3]>,
+    displacements: Vec<[f32; 3]>,
     /// m.
     spacing: f64,
 }
@@ -128,7 +128,7 @@ impl Field<'_> {
         nodes.dedup();
         // Nodes in the same particle cell share the particles around them.
         let shared: Vec<&[Coord]> = nodes.chunk_by(|a, b| a.map(|x| x >> 1) == b.map(|x| x >> 1)).collect();
-        let maps: Vec<Vec<Option<Map>>> = shared
+        let maps: Vec<Vec<Option<AffineMap>>> = shared
             .par_iter()
             .with_min_len(4)
             .map_init(Scratch::default, |scratch, nodes| {
@@ -136,7 +136,7 @@ impl Field<'_> {
                 Ok(self.maps_at(nodes, scratch))
             })
             .collect::<Result<_>>()?;
-        let maps: Vec<Option<Map>> = maps.into_iter().flatten().collect();
+        let maps: Vec<Option<AffineMap>> = maps.into_iter().flatten().collect();
         let find = |node: &Coord| {
             let key = (node.map(|x| x >> 1), *node);
             let at = nodes.binary_search_by_key(&key, |node| (node.map(|x| x >> 1), *node));
@@ -145,20 +145,20 @@ impl Field<'_> {
         let follow = |group: &[(Coord, u32)]| {
             let cell = group[0].0;
             let around = nodes_of(cell).each_ref().map(find);
-            let way = |(_, vertex): &(Coord, u32)| {
+            let displacement = |(_, vertex): &(Coord, u32)| {
                 let at = vertices[*vertex as usize] / self.spacing - DVec3::from(cell.map(f64::from));
                 blended(&around, at).unwrap_or_else(|| self.mean_far(vertices[*vertex as usize]))
                     * self.spacing
             };
-            group.iter().map(way).collect()
+            group.iter().map(displacement).collect()
         };
-        let ways = each(ctx, &groups, follow)?;
-        add(&groups, &ways, vertices);
+        let displacements = displacements_of(ctx, &groups, follow)?;
+        displace(&groups, &displacements, vertices);
         Ok(())
     }
 
     /// The maps at nodes in one of the particles' cells; none where no particle is near.
-    fn maps_at(&self, nodes: &[Coord], scratch: &mut Scratch) -> Vec<Option<Map>> {
+    fn maps_at(&self, nodes: &[Coord], scratch: &mut Scratch) -> Vec<Option<AffineMap>> {
         let Scratch { of_cell, of_position } = scratch;
         let cell = nodes[0].map(|x| x >> 1);
         self.gather(cell, 2, of_cell);
@@ -182,15 +182,15 @@ impl Field<'_> {
             let cell = group[0].0;
             let (mut of_cell, mut of_position) = (Near::default(), Near::default());
             self.gather(cell, 1, &mut of_cell);
-            let way = |(_, vertex): &(Coord, u32)| {
+            let displacement = |(_, vertex): &(Coord, u32)| {
                 let position = vertices[*vertex as usize];
                 let sums = sums(&of_cell, &mut of_position, self.seen_from(cell, position), MEAN_RADIUS);
                 sums.map_or_else(|| self.mean_far(position), |sums| sums.mean()) * self.spacing
             };
-            group.iter().map(way).collect()
+            group.iter().map(displacement).collect()
         };
-        let ways = each(ctx, &groups, follow)?;
-        add(&groups, &ways, vertices);
+        let displacements = displacements_of(ctx, &groups, follow)?;
+        displace(&groups, &displacements, vertices);
         Ok(())
     }
 
@@ -205,7 +205,7 @@ impl Field<'_> {
         out.clear();
         let [low, high] = [-rings, rings].map(|by| cell.map(|at| at.saturating_add(by)));
         self.cells.near(low, high, cell, |particle, offset| {
-            out.push(offset.map(|x| 2.0 * x), self.ways[particle]);
+            out.push(offset.map(|x| 2.0 * x), self.displacements[particle]);
         });
     }
 
@@ -213,17 +213,17 @@ impl Field<'_> {
     fn mean_far(&self, position: DVec3) -> DVec3 {
         let cell =
             [0, 1, 2].map(|axis| (position[axis] / self.cells.edge()).floor().clamp(-LIMIT, LIMIT) as i32);
-        let (mut near, mut room) = (Near::default(), Near::default());
+        let (mut near, mut in_radius) = (Near::default(), Near::default());
         let found: Option<Sums> = (1..=DOUBLINGS).find_map(|doubling| {
             self.gather(cell, 1 << doubling, &mut near);
-            sums(&near, &mut room, self.seen_from(cell, position), MEAN_RADIUS * (1 << doubling) as f32)
+            sums(&near, &mut in_radius, self.seen_from(cell, position), MEAN_RADIUS * (1 << doubling) as f32)
         });
         found.map_or_else(DVec3::zeros, |sums| sums.mean())
     }
 }
 
 /// The displacements (m) of the vertices of each group.
-fn each(
+fn displacements_of(
     ctx: &Context,
     groups: &[&[(Coord, u32)]],
     follow: impl Fn(&[(Coord, u32)]) -> Vec<DVec3> + Sync,
@@ -235,15 +235,15 @@ fn each(
     groups.par_iter().with_min_len(16).map(one).collect()
 }
 
-fn add(groups: &[&[(Coord, u32)]], ways: &[Vec<DVec3>], vertices: &mut [DVec3]) {
-    for ((_, vertex), way) in groups.iter().copied().flatten().zip(ways.iter().flatten()) {
-        vertices[*vertex as usize] += way;
+fn displace(groups: &[&[(Coord, u32)]], displacements: &[Vec<DVec3>], vertices: &mut [DVec3]) {
+    for ((_, vertex), displacement) in groups.iter().copied().flatten().zip(displacements.iter().flatten()) {
+        vertices[*vertex as usize] += displacement;
     }
 }
 
 /// Blends the maps at the corners of a cell at a position in it (0..1 on each axis): weights grow with proximity and with the particle
 /// weight behind a map. None without maps.
-fn blended(maps: &[Option<Map>; 8], at: DVec3) -> Option<DVec3> {
+fn blended(maps: &[Option<AffineMap>; 8], at: DVec3) -> Option<DVec3> {
     let (mut sum, mut all) = (Vector3::zeros(), 0.0);
     for (n, map) in maps.iter().enumerate() {
         let Some(map) = map else { continue };

@@ -34,13 +34,13 @@ impl Tracker {
         for (position, delta) in vertices.iter().zip(&self.delta) {
             let far = f64::from(delta.abs()) / spacing;
             // Maximum displacement of a vertex on the path to its foot.
-            let [reach, way] =
+            let [reach, path] =
                 if delta.is_nan() { [unknown; 2] } else { [self.reach_for(far), far + 2.0 * DRIFT] };
             if reach > self.reach {
-                let side = DVec3::repeat(cells(way) + READ);
+                let side = DVec3::repeat(cells(path) + READ);
                 let corners = [position / cell - side, position / cell + side];
-                let most = boxes.entry(corners.map(|at| cell_of(&(at / DIM as f64)))).or_default();
-                *most = most.max(cells(reach));
+                let max_reach = boxes.entry(corners.map(|at| cell_of(&(at / DIM as f64)))).or_default();
+                *max_reach = max_reach.max(cells(reach));
             }
         }
         let blocks = |([low, high], reach): ([Coord; 2], f64)| {

@@ -18,19 +18,19 @@ const GRAIN: usize = 256;
 /// Number of iterations in which new positions pull the old surface towards them.
 const PULLS: usize = 16;
 /// Maximum displacement to what replaces a vertex (spacings): anything farther away is another surface that appears.
-const LONGEST: f64 = 4.0;
+const MAX_DISPLACEMENT: f64 = 4.0;
 /// A part of the old surface is not eased if nothing new on it is farther away than this (spacings): there is no jump to hide.
 const NEAR: f64 = 0.25;
 /// Number of iterations in which vertices without a pull take the mean displacement of their neighbours.
 const SPREAD: usize = 8;
 /// Pulls on a vertex are ignored if their weights add up to less than this.
-const LEAST: f64 = 1e-3;
+const MIN_WEIGHT: f64 = 1e-3;
 
 /// Effect of a step on the vertices before it.
 #[derive(Debug, Clone, Default)]
 pub struct EasingTargets {
     /// Vertices that are removed, ascending, with their displacements (m) to what replaces them.
-    ways: Vec<(u32, DVec3)>,
+    displacements: Vec<(u32, DVec3)>,
     /// For each vertex, its vertex before the step, if any vertex is new or was removed.
     origins: Origins,
 }
@@ -41,13 +41,13 @@ impl EasingTargets {
     /// # Errors
     /// Cancel.
     pub fn of(ctx: &Context, change: &Change, triangles: &[[u32; 3]], spacing: f64) -> Result<Self> {
-        let ways = ctx.phase("ease", || ways(ctx, change, triangles, spacing))?;
-        Ok(Self { ways, origins: Some(change.origins.clone()) })
+        let displacements = ctx.phase("ease", || easing_displacements(ctx, change, triangles, spacing))?;
+        Ok(Self { displacements, origins: Some(change.origins.clone()) })
     }
 
     /// For a mesh that is exchanged for an unrelated one.
-    pub fn cut(vertices: usize) -> Self {
-        Self { ways: Vec::new(), origins: Some(vec![None; vertices]) }
+    pub fn unrelated(vertices: usize) -> Self {
+        Self { displacements: Vec::new(), origins: Some(vec![None; vertices]) }
     }
 
     /// The index that a vertex had before the step; none: it is new.
@@ -56,16 +56,19 @@ impl EasingTargets {
     }
 
     /// Whether a vertex before the step is removed and something replaces it.
-    pub fn takes(&self, vertex: u32) -> bool {
-        self.ways.binary_search_by_key(&vertex, |(vertex, _)| *vertex).is_ok()
+    pub fn is_replaced(&self, vertex: u32) -> bool {
+        self.displacements.binary_search_by_key(&vertex, |(vertex, _)| *vertex).is_ok()
     }
 
     /// The combination of two successive steps.
     pub fn then(mut self, next: &Self) -> Self {
-        let ways = next.ways.iter().filter_map(|(vertex, way)| Some((origin(&self.origins, *vertex)?, *way)));
-        self.ways.extend(ways);
-        self.ways.sort_unstable_by_key(|(vertex, _)| *vertex);
-        self.origins = through(self.origins, &next.origins);
+        let displacements = next
+            .displacements
+            .iter()
+            .filter_map(|(vertex, displacement)| Some((origin(&self.origins, *vertex)?, *displacement)));
+        self.displacements.extend(displacements);
+        self.displacements.sort_unstable_by_key(|(vertex, _)| *vertex);
+        self.origins = composed(self.origins, &next.origins);
         self
     }
 }
@@ -78,7 +81,7 @@ fn origin(origins: &Origins, vertex: u32) -> Option<u32> {
 }
 
 /// Origins through two steps.
-fn through(first: Origins, second: &Origins) -> Origins {
+fn composed(first: Origins, second: &Origins) -> Origins {
     let Some(second) = second else { return first };
     Some(second.iter().map(|at| at.and_then(|at| origin(&first, at))).collect())
 }
@@ -98,14 +101,14 @@ pub struct Eased {
 /// `ahead` steps before the step that removes a vertex, grows with each step, and is complete when that step is done.
 pub fn eased<'a>(coming: impl IntoIterator<Item = &'a EasingTargets>, ahead: usize) -> Vec<Eased> {
     let (mut origins, mut moved) = (None, Vec::new());
-    for (step, leads) in (1..=ahead + 1).zip(coming) {
+    for (step, targets) in (1..=ahead + 1).zip(coming) {
         let [now, next] = [step, step - 1].map(|steps| weight(steps, ahead));
-        for (vertex, way) in &leads.ways {
+        for (vertex, displacement) in &targets.displacements {
             if let Some(vertex) = origin(&origins, *vertex) {
-                moved.push(Eased { vertex, now: way * now, next: way * next });
+                moved.push(Eased { vertex, now: displacement * now, next: displacement * next });
             }
         }
-        origins = through(origins, &leads.origins);
+        origins = composed(origins, &targets.origins);
     }
     moved.sort_by_key(|eased| eased.vertex);
     moved
@@ -119,18 +122,28 @@ fn weight(steps: usize, ahead: usize) -> f64 {
 
 /// The displacements (m) of the vertices that a change removes, by their index before it; a spacing, the unit of the limits, is `spacing` m
 /// long.
-fn ways(ctx: &Context, change: &Change, triangles: &[[u32; 3]], spacing: f64) -> Result<Vec<(u32, DVec3)>> {
+fn easing_displacements(
+    ctx: &Context,
+    change: &Change,
+    triangles: &[[u32; 3]],
+    spacing: f64,
+) -> Result<Vec<(u32, DVec3)>> {
     let Some(old) = Patch::old(change, triangles) else { return Ok(Vec::new()) };
     let new = Patch::new(change);
     if new.triangles.is_empty() {
         return Ok(Vec::new());
     }
     // Positions are relative to one of them: far from the origin 32 bits are not precise enough.
-    let origin = change.before[old.names[0] as usize];
-    let begin: Vec<DVec3> = old.names.iter().map(|name| change.before[*name as usize] - origin).collect();
-    let ends: Vec<DVec3> = new.names.iter().map(|name| change.vertices[*name as usize] - origin).collect();
+    let origin = change.before[old.indices[0] as usize];
+    let begin: Vec<DVec3> = old.indices.iter().map(|index| change.before[*index as usize] - origin).collect();
+    let ends: Vec<DVec3> =
+        new.indices.iter().map(|index| change.vertices[*index as usize] - origin).collect();
     let made = ends.iter().zip(&new.is_loose).filter(|(_, made)| **made).map(|(position, _)| *position);
-    let made = old.jumps(&begin, made.collect(), [NEAR, LONGEST].map(|length| length * spacing));
+    let made = old.positions_at_jumps(
+        &begin,
+        made.collect(),
+        [NEAR, MAX_DISPLACEMENT].map(|length| length * spacing),
+    );
     if made.is_empty() {
         return Ok(Vec::new());
     }
@@ -152,23 +165,24 @@ fn ways(ctx: &Context, change: &Change, triangles: &[[u32; 3]], spacing: f64) ->
             }
         }
         for (at, (pull, share)) in pulls.into_iter().enumerate() {
-            if old.is_loose[at] && share > LEAST {
+            if old.is_loose[at] && share > MIN_WEIGHT {
                 positions[at] += pull / share;
                 is_pulled[at] = true;
             }
         }
     }
-    let mut ways: Vec<DVec3> = positions.iter().zip(&begin).map(|(to, from)| to - from).collect();
-    old.spread(&mut ways, &is_pulled);
-    let limit = LONGEST * spacing;
-    let moved = (0..ways.len()).filter(|at| ways[*at] != DVec3::zeros() && ways[*at].norm() <= limit);
-    Ok(moved.map(|at| (old.names[at], ways[at])).collect())
+    let mut displacements: Vec<DVec3> = positions.iter().zip(&begin).map(|(to, from)| to - from).collect();
+    old.spread(&mut displacements, &is_pulled);
+    let limit = MAX_DISPLACEMENT * spacing;
+    let moved = (0..displacements.len())
+        .filter(|at| displacements[*at] != DVec3::zeros() && displacements[*at].norm() <= limit);
+    Ok(moved.map(|at| (old.indices[at], displacements[at])).collect())
 }
 
 /// Triangles that a change removes, or that it creates.
 struct Patch {
     /// Indices of the mesh's vertices, ascending.
-    names: Vec<u32>,
+    indices: Vec<u32>,
     /// Whether each vertex is removed, or new; the others stay.
     is_loose: Vec<bool>,
     /// Triangles of these vertices.
@@ -178,9 +192,9 @@ struct Patch {
 impl Patch {
     /// The triangles that are removed or changed; none if no vertex is removed.
     fn old(change: &Change, triangles: &[[u32; 3]]) -> Option<Self> {
-        let mut goes = vec![true; change.before.len()];
-        change.origins.iter().flatten().for_each(|at| goes[*at as usize] = false);
-        if !goes.contains(&true) {
+        let mut is_removed = vec![true; change.before.len()];
+        change.origins.iter().flatten().for_each(|at| is_removed[*at as usize] = false);
+        if !is_removed.contains(&true) {
             return None;
         }
         let mut is_old = vec![true; triangles.len()];
@@ -189,27 +203,28 @@ impl Patch {
                 is_old[*at as usize] = false;
             }
         }
-        let old = triangles.iter().zip(&is_old).filter(|(_, is_old)| **is_old).map(|(names, _)| *names);
-        let patch = Self::of(goes.len(), old.collect(), |name| goes[name as usize]);
+        let old = triangles.iter().zip(&is_old).filter(|(_, is_old)| **is_old).map(|(indices, _)| *indices);
+        let patch = Self::of(is_removed.len(), old.collect(), |index| is_removed[index as usize]);
         (!patch.triangles.is_empty()).then_some(patch)
     }
 
     /// The triangles that are new, or parts of others.
     fn new(change: &Change) -> Self {
         let made = change.sources.iter().zip(&change.triangles);
-        let made = made.filter(|(source, _)| !matches!(source, Source::Whole(_))).map(|(_, names)| *names);
-        Self::of(change.vertices.len(), made.collect(), |name| change.origins[name as usize].is_none())
+        let made =
+            made.filter(|(source, _)| !matches!(source, Source::Whole(_))).map(|(_, indices)| *indices);
+        Self::of(change.vertices.len(), made.collect(), |index| change.origins[index as usize].is_none())
     }
 
     fn of(vertices: usize, triangles: Vec<[u32; 3]>, is_loose: impl Fn(u32) -> bool) -> Self {
-        let (names, triangles) = compact(vertices, &triangles);
-        Self { is_loose: names.iter().map(|name| is_loose(*name)).collect(), names, triangles }
+        let (indices, triangles) = compact(vertices, &triangles);
+        Self { is_loose: indices.iter().map(|index| is_loose(*index)).collect(), indices, triangles }
     }
 
     /// The new positions at parts of the patch where the surface jumps: each belongs to the nearest part (whose vertices lie at `begin`),
     /// and a part jumps if one of its positions is farther away than `near`. Positions beyond `longest` belong to another surface, and are
     /// left out.
-    fn jumps(&self, begin: &[DVec3], made: Vec<DVec3>, [near, longest]: [f64; 2]) -> Vec<DVec3> {
+    fn positions_at_jumps(&self, begin: &[DVec3], made: Vec<DVec3>, [near, longest]: [f64; 2]) -> Vec<DVec3> {
         let mut part_of = vec![0; self.triangles.len()];
         let parts = bodies(&self.triangles);
         for (part, triangles) in parts.iter().enumerate() {
@@ -230,19 +245,20 @@ impl Patch {
     }
 
     /// Gives each removed or new vertex without a displacement the mean of those around it, several times; vertices that stay have none.
-    fn spread(&self, ways: &mut [DVec3], has_way: &[bool]) {
+    fn spread(&self, displacements: &mut [DVec3], is_pulled: &[bool]) {
         for _ in 0..SPREAD {
-            let sums = around(ways.len(), &self.triangles, |vertex| Some(ways[vertex as usize]));
+            let sums =
+                around(displacements.len(), &self.triangles, |vertex| Some(displacements[vertex as usize]));
             for (at, (sum, count)) in sums.into_iter().enumerate() {
-                if self.is_loose[at] && !has_way[at] && count > 0 {
-                    ways[at] = sum / f64::from(count);
+                if self.is_loose[at] && !is_pulled[at] && count > 0 {
+                    displacements[at] = sum / f64::from(count);
                 }
             }
         }
     }
 
-    fn tree(&self, places: &[DVec3]) -> NearestTree {
-        let positions: Vec<Vec3> = places.iter().map(|place| place.cast()).collect();
+    fn tree(&self, positions: &[DVec3]) -> NearestTree {
+        let positions: Vec<Vec3> = positions.iter().map(|position| position.cast()).collect();
         NearestTree::new(&TriMesh { positions, triangles: self.triangles.clone() })
     }
 }
@@ -258,11 +274,11 @@ mod tests {
         let balls = |away: f64| two_balls(4.2, DVec3::new(away, 0.1, 0.0));
         let mut from = balls(6.5);
         let mut tracker = rebuilt(&ctx, &from);
-        let farthest = |places: &[DVec3], triangles: &[[u32; 3]], change: &Change| {
-            let positions = places.iter().map(|place| place.cast()).collect();
+        let farthest = |positions: &[DVec3], triangles: &[[u32; 3]], change: &Change| {
+            let positions = positions.iter().map(|position| position.cast()).collect();
             let tree = NearestTree::new(&TriMesh { positions, triangles: triangles.to_vec() });
             let made = change.vertices.iter().zip(&change.origins).filter(|(_, origin)| origin.is_none());
-            made.map(|(place, _)| tree.nearest(*place).unwrap().distance).fold(0.0, f64::max)
+            made.map(|(position, _)| tree.nearest(*position).unwrap().distance).fold(0.0, f64::max)
         };
         let mut seen = 0;
         for step in 1..=16 {
@@ -275,15 +291,15 @@ mod tests {
             if far < 0.5 {
                 continue;
             }
-            let mut places = change.before.clone();
-            let leads = EasingTargets::of(&ctx, &change, &triangles, 1.0).unwrap();
-            eased([&leads], 0).iter().for_each(|eased| places[eased.vertex as usize] += eased.next);
-            assert!(farthest(&places, &triangles, &change) < 0.35 * far, "{step}");
+            let mut positions = change.before.clone();
+            let targets = EasingTargets::of(&ctx, &change, &triangles, 1.0).unwrap();
+            eased([&targets], 0).iter().for_each(|eased| positions[eased.vertex as usize] += eased.next);
+            assert!(farthest(&positions, &triangles, &change) < 0.35 * far, "{step}");
             // Vertices that stay are not displaced.
             let stay: Vec<u32> = change.origins.iter().copied().flatten().collect();
             assert!(stay.len() > 100, "{step}: {} stay", stay.len());
             for at in stay {
-                assert_eq!(places[at as usize], change.before[at as usize]);
+                assert_eq!(positions[at as usize], change.before[at as usize]);
             }
             seen += 1;
         }
@@ -293,22 +309,31 @@ mod tests {
     #[test]
     fn a_vertex_is_moved_more_the_nearer_its_change_is_by_the_name_that_it_has() {
         // The second step removes vertex 1, which was vertex 2 before the first.
-        let way = DVec3::new(1.0, 2.0, 3.0);
-        let first = EasingTargets { ways: Vec::new(), origins: Some(vec![Some(0), Some(2), None]) };
-        let second = EasingTargets { ways: vec![(1, way), (2, way)], origins: Some(vec![Some(0)]) };
+        let displacement = DVec3::new(1.0, 2.0, 3.0);
+        let first = EasingTargets { displacements: Vec::new(), origins: Some(vec![Some(0), Some(2), None]) };
+        let second = EasingTargets {
+            displacements: vec![(1, displacement), (2, displacement)],
+            origins: Some(vec![Some(0)]),
+        };
         let still = EasingTargets::default();
         let moved = |coming: &[&EasingTargets]| eased(coming.iter().copied(), 3);
         assert!(moved(&[&still, &still]).is_empty());
         let [one] = moved(&[&first, &second])[..] else { panic!("one vertex is moved") };
-        assert!(one.vertex == 2 && one.now == way * 0.5 && one.next == way * 0.84375, "{one:?}");
+        assert!(
+            one.vertex == 2 && one.now == displacement * 0.5 && one.next == displacement * 0.84375,
+            "{one:?}"
+        );
         let both = first.clone().then(&second);
-        assert_eq!((both.ways.clone(), both.origins.clone()), (vec![(2, way)], Some(vec![Some(0)])));
+        assert_eq!(
+            (both.displacements.clone(), both.origins.clone()),
+            (vec![(2, displacement)], Some(vec![Some(0)]))
+        );
         let [one] = moved(&[&still, &still, &still, &both])[..] else { panic!("one vertex is moved") };
-        assert!(one.now == DVec3::zeros() && one.next == way * 0.15625, "{one:?}");
+        assert!(one.now == DVec3::zeros() && one.next == displacement * 0.15625, "{one:?}");
         assert!(moved(&[&still, &still, &still, &still, &both]).is_empty());
-        assert!(moved(&[&EasingTargets::cut(3), &second]).is_empty());
+        assert!(moved(&[&EasingTargets::unrelated(3), &second]).is_empty());
         let [one, two] = eased([&second], 0)[..] else { panic!("two vertices are moved") };
         assert_eq!((one.vertex, two.vertex), (1, 2));
-        assert!([one, two].iter().all(|eased| eased.now == DVec3::zeros() && eased.next == way));
+        assert!([one, two].iter().all(|eased| eased.now == DVec3::zeros() && eased.next == displacement));
     }
 }

@@ -39,14 +39,14 @@ pub fn uncrossed(
         return Ok(displaced);
     }
     ctx.phase("ease", || {
-        let around = Around::of(vertices, triangles, &displaced);
+        let reached_region = ReachedRegion::of(vertices, triangles, &displaced);
         let mut shares = vec![0.0; displaced.len()];
-        let own = around.meeting(&shares);
+        let own = reached_region.intersecting_pairs(&shares);
         shares.fill(1.0);
         for round in 0..=ROUNDS {
             ctx.check()?;
-            let met = around.met(&own, &shares);
-            if met.is_empty() {
+            let crossed = reached_region.crossed(&own, &shares);
+            if crossed.is_empty() {
                 break;
             }
             if round == ROUNDS {
@@ -54,25 +54,25 @@ pub fn uncrossed(
                 break;
             }
             let share = if round < HALVINGS { 0.5 } else { 0.0 };
-            met.into_iter().for_each(|slot| shares[slot as usize] *= share);
-            around.even_out(&mut shares);
+            crossed.into_iter().for_each(|slot| shares[slot as usize] *= share);
+            reached_region.even_out(&mut shares);
         }
         Ok(displaced.iter().zip(shares).map(|((vertex, by), share)| (*vertex, by * share)).collect())
     })
 }
 
 /// The part of a mesh that displacements may reach.
-struct Around<'a> {
+struct ReachedRegion<'a> {
     vertices: &'a [DVec3],
     displaced: &'a [Displaced],
     /// Indices of the mesh's vertices, ascending, and the displacement of each, if it has one.
-    names: Vec<u32>,
+    indices: Vec<u32>,
     slots: Vec<u32>,
     /// Triangles of these vertices.
     triangles: Vec<[u32; 3]>,
 }
 
-impl<'a> Around<'a> {
+impl<'a> ReachedRegion<'a> {
     fn of(vertices: &'a [DVec3], triangles: &[[u32; 3]], displaced: &'a [Displaced]) -> Self {
         let mut slots = vec![NONE; vertices.len()];
         (0..).zip(displaced).for_each(|(slot, (vertex, _))| slots[*vertex as usize] = slot);
@@ -91,31 +91,31 @@ impl<'a> Around<'a> {
         let bins = Bins::of(&reached);
         let near: Vec<[u32; 3]> =
             triangles.iter().filter(|corners| bins.has(&bounds(corners))).copied().collect();
-        let (names, triangles) = compact(vertices.len(), &near);
-        let slots = names.iter().map(|name| slots[*name as usize]).collect();
-        Self { vertices, displaced, triangles, names, slots }
+        let (indices, triangles) = compact(vertices.len(), &near);
+        let slots = indices.iter().map(|index| slots[*index as usize]).collect();
+        Self { vertices, displaced, triangles, indices, slots }
     }
 
     /// Pairs of triangles that intersect if vertices are displaced by these shares of the requested displacements.
-    fn meeting(&self, shares: &[f64]) -> Vec<[u32; 2]> {
-        let position = |(name, slot): (&u32, &u32)| {
-            let own = self.vertices[*name as usize];
+    fn intersecting_pairs(&self, shares: &[f64]) -> Vec<[u32; 2]> {
+        let position = |(index, slot): (&u32, &u32)| {
+            let own = self.vertices[*index as usize];
             let by = self.displaced.get(*slot as usize).map(|(_, by)| by * shares[*slot as usize]);
             by.map_or(own, |by| own + by).cast()
         };
-        let positions = self.names.iter().zip(&self.slots).map(position).collect();
+        let positions = self.indices.iter().zip(&self.slots).map(position).collect();
         meeting_pairs(&TriMesh { positions, triangles: self.triangles.clone() })
     }
 
     /// The displacements at triangles that intersect with these shares, but not without displacements; ascending.
-    fn met(&self, own: &[[u32; 2]], shares: &[f64]) -> Vec<u32> {
-        let new = self.meeting(shares).into_iter().filter(|pair| own.binary_search(pair).is_err());
+    fn crossed(&self, own: &[[u32; 2]], shares: &[f64]) -> Vec<u32> {
+        let new = self.intersecting_pairs(shares).into_iter().filter(|pair| own.binary_search(pair).is_err());
         let corners = new.flatten().flat_map(|triangle| self.triangles[triangle as usize]);
-        let mut met: Vec<u32> =
+        let mut crossed: Vec<u32> =
             corners.map(|corner| self.slots[corner as usize]).filter(|slot| *slot != NONE).collect();
-        met.sort_unstable();
-        met.dedup();
-        met
+        crossed.sort_unstable();
+        crossed.dedup();
+        crossed
     }
 
     /// Lowers shares that are far above those of neighbours.
@@ -124,10 +124,10 @@ impl<'a> Around<'a> {
         for corners in &self.triangles {
             let slots = corners.map(|corner| self.slots[corner as usize]);
             let own = slots.into_iter().filter(|slot| *slot != NONE);
-            let least = own.clone().map(|slot| before[slot as usize]).fold(f64::INFINITY, f64::min);
+            let min = own.clone().map(|slot| before[slot as usize]).fold(f64::INFINITY, f64::min);
             for slot in own {
                 let share = &mut shares[slot as usize];
-                *share = share.min(least + STEP);
+                *share = share.min(min + STEP);
             }
         }
     }
@@ -233,14 +233,14 @@ mod tests {
         for frame in 0..14 {
             let coming = (1..=AHEAD + 1).map(|ahead| balls(frame + ahead)).collect();
             outlook.look(&ctx, &tracker, balls(frame), coming, 0.04).unwrap();
-            let places = outlook.eased(&ctx, &tracker, AHEAD).unwrap();
-            moved += places.iter().zip(tracker.vertices()).filter(|(shown, own)| shown != own).count();
-            let pairs = |places: &[DVec3]| {
-                let positions = places.iter().map(|place| place.cast()).collect();
+            let positions = outlook.eased(&ctx, &tracker, AHEAD).unwrap();
+            moved += positions.iter().zip(tracker.vertices()).filter(|(shown, own)| shown != own).count();
+            let pairs = |positions: &[DVec3]| {
+                let positions = positions.iter().map(|position| position.cast()).collect();
                 meeting_pairs(&TriMesh { positions, triangles: tracker.triangles().to_vec() })
             };
             let own = pairs(tracker.vertices());
-            assert!(pairs(&places).iter().all(|pair| own.contains(pair)), "frame {frame}");
+            assert!(pairs(&positions).iter().all(|pair| own.contains(pair)), "frame {frame}");
             tracker = outlook.take(&balls(frame), &balls(frame + 1), 0.04).unwrap().0;
         }
         assert!(moved > 20, "{moved}");

@@ -1,6 +1,6 @@
 //! A mesh without liquid: before the first particles appear, and when all are gone.
 
-use super::ahead::Ahead;
+use super::prefetch::Prefetch;
 use crate::context::Context;
 use crate::error::Result;
 use crate::surface::Particles;
@@ -8,7 +8,7 @@ use crate::surface::params::Params;
 use crate::surface::particles::paths::Paths;
 use crate::surface::remesh::drift::Drift;
 use crate::surface::report::StepReport;
-use crate::surface::topology::change::{Change, Unfit};
+use crate::surface::topology::change::{Change, FlaggedMesh};
 use crate::surface::tracked_mesh::Tracker;
 
 impl Tracker {
@@ -36,20 +36,20 @@ impl Tracker {
             let lost = self.vertices.len();
             Ok((carried, StepReport { lost, parts, died: paths.died, ..StepReport::default() }))
         })?;
-        self.ahead = Ahead::default();
+        self.prefetch = Prefetch::default();
         let mut report = StepReport { phases, ..report };
         if !self.params.rebuild {
             self.flags.fill(true);
         } else if !self.vertices.is_empty() {
-            let unfit = Unfit {
+            let mesh = FlaggedMesh {
                 vertices: &carried,
                 triangles: &self.triangles,
                 flags: &self.flags,
-                bare: &[],
-                everywhere: None,
+                uncovered: &[],
+                full_check: None,
             };
-            let change = Change::to_nothing(&unfit);
-            self.take(&change);
+            let change = Change::to_nothing(&mesh);
+            self.apply_change(&change);
             self.drift = Drift::default();
             report.change = Some(change);
         }

@@ -18,17 +18,17 @@ pub struct Outlook {
     /// The particles at which the first step begins.
     from: Particles,
     /// In order.
-    steps: VecDeque<Coming>,
+    steps: VecDeque<ComingStep>,
 }
 
 /// A coming step.
 #[derive(Debug)]
-struct Coming {
+struct ComingStep {
     to: Particles,
     dt: f64,
     after: Tracker,
     report: StepReport,
-    leads: EasingTargets,
+    targets: EasingTargets,
 }
 
 impl Outlook {
@@ -49,7 +49,7 @@ impl Outlook {
             self.steps.clear();
             self.from = from;
         }
-        let is_same = |(step, to): &(&Coming, &Particles)| step.dt == dt && step.to == **to;
+        let is_same = |(step, to): &(&ComingStep, &Particles)| step.dt == dt && step.to == **to;
         let same = self.steps.iter().zip(&coming).take_while(is_same).count();
         self.steps.truncate(same);
         for to in coming.into_iter().skip(same) {
@@ -61,23 +61,23 @@ impl Outlook {
             let triangles = after.triangles().to_vec();
             let report = after.step(ctx, from, &to, dt)?;
             let spacing = tracker.params().spacing;
-            let leads = match &report.change {
+            let targets = match &report.change {
                 Some(change) => EasingTargets::of(ctx, change, &triangles, spacing)?,
                 None => EasingTargets::default(),
             };
-            self.steps.push_back(Coming { to, dt, after, report, leads });
+            self.steps.push_back(ComingStep { to, dt, after, report, targets });
         }
         Ok(())
     }
 
     /// The result of a step, if it has been computed.
     pub fn take(&mut self, from: &Particles, to: &Particles, dt: f64) -> Option<(Tracker, StepReport)> {
-        let is_it = |step: &Coming| step.dt == dt && step.to == *to;
-        if self.from != *from || !self.steps.front().is_some_and(is_it) {
+        let is_next = |step: &ComingStep| step.dt == dt && step.to == *to;
+        if self.from != *from || !self.steps.front().is_some_and(is_next) {
             *self = Self::default();
             return None;
         }
-        let Coming { to, after, report, .. } = self.steps.pop_front()?;
+        let ComingStep { to, after, report, .. } = self.steps.pop_front()?;
         self.from = to;
         Some((after, report))
     }
@@ -89,7 +89,7 @@ impl Outlook {
     /// Cancel.
     pub fn eased(&self, ctx: &Context, tracker: &Tracker, ahead: usize) -> Result<Vec<DVec3>> {
         let mut positions = tracker.vertices().to_vec();
-        let moved = displaced(&eased(self.steps.iter().map(|step| &step.leads), ahead));
+        let moved = displaced(&eased(self.steps.iter().map(|step| &step.targets), ahead));
         for (vertex, by) in uncrossed(ctx, tracker.vertices(), tracker.triangles(), moved)? {
             positions[vertex as usize] += by;
         }

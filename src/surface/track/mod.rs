@@ -1,12 +1,12 @@
 //! A step of the mesh while its liquid keeps its topology: it is carried along and projected, fades, and is eased for display.
 
 pub(in crate::surface) mod advect;
-pub(in crate::surface) mod ahead;
 pub(in crate::surface) mod deep_detail;
 pub(in crate::surface) mod easing;
 pub(in crate::surface) mod easing_limit;
 mod empty;
 pub(in crate::surface) mod fade;
 pub(in crate::surface) mod lookahead;
+pub(in crate::surface) mod prefetch;
 pub(in crate::surface) mod project;
 mod resculpt;

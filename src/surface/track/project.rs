@@ -35,16 +35,16 @@ pub fn foot(sampler: &mut Sampler<'_>, position: DVec3) -> Option<Foot> {
         let gradient = DVec3::from(slope.map(f64::from));
         let unit = gradient.try_normalize(1e-3)?;
         if phi.abs() < ARRIVED {
-            let way = position - at;
-            let length = way.norm();
+            let offset = position - at;
+            let length = offset.norm();
             // Signed as phi: the vector to the vertex points outward from outside, and inward from inside.
             let sign = if first < 0.0 { -1.0 } else { 1.0 };
             return Some(if length < TINY {
                 // The vertex' own foot in that direction.
-                let distance = way.dot(&unit);
+                let distance = offset.dot(&unit);
                 Foot { position: position - unit * distance, outward: unit, distance }
             } else {
-                Foot { position: at, outward: way * (sign / length), distance: sign * length }
+                Foot { position: at, outward: offset * (sign / length), distance: sign * length }
             });
         }
         at -= unit * (share * f64::from(phi));
@@ -76,19 +76,19 @@ mod tests {
         let phi = Implicit::new(&ctx, &positions, 1.0, 0.5).unwrap();
         let distances = Distances::new(&ctx, &phi, &Isosurface::new(&phi), 6.0).unwrap();
         let mut sampler = Sampler::new(&distances);
-        let way = DVec3::new(2.0, 1.0, 3.0).normalize();
+        let direction = DVec3::new(2.0, 1.0, 3.0).normalize();
         // Cells are half as long as spacings.
-        let surface = foot(&mut sampler, way * 14.0).unwrap();
-        let height = surface.position.dot(&way);
+        let surface = foot(&mut sampler, direction * 14.0).unwrap();
+        let height = surface.position.dot(&direction);
         for above in [-3.0, -0.5, -0.05, 0.05, 0.5, 3.0] {
-            let position = way * (height + above);
+            let position = direction * (height + above);
             let foot = foot(&mut sampler, position).unwrap();
             assert!((foot.distance - above).abs() < 0.15, "{above}: {foot:?}");
-            assert!(foot.outward.dot(&way) > 0.9, "{above}: {foot:?}");
+            assert!(foot.outward.dot(&direction) > 0.9, "{above}: {foot:?}");
             assert!((foot.at(foot.distance) - position).norm() < 1e-6, "{above}: {foot:?}");
             // A vertex that drifted through the surface comes back to its own side.
-            assert!((foot.at(-above) - way * (height - above)).norm() < 1.0, "{above}: {foot:?}");
+            assert!((foot.at(-above) - direction * (height - above)).norm() < 1.0, "{above}: {foot:?}");
         }
-        assert!(super::foot(&mut sampler, way * 100.0).is_none());
+        assert!(super::foot(&mut sampler, direction * 100.0).is_none());
     }
 }

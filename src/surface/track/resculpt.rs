@@ -29,7 +29,7 @@ impl Tracker {
         // Even if the triangles are the initial ones: sizes and detail retention are no longer those of the initial mesh.
         next.is_rebuilt = true;
         // The surface of the coming particles is the same for every mesh.
-        next.ahead = std::mem::take(&mut self.ahead);
+        next.prefetch = std::mem::take(&mut self.prefetch);
         *self = next;
         Ok(StepReport { phases, ..report })
     }

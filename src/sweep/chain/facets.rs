@@ -77,12 +77,12 @@ pub fn facets(ctx: &Context, bins: &Bins, exposure: &Exposure) -> Result<Vec<Fac
     ctx.check()?;
     let mut verdicts = vec![0; sorted.len()];
     order.iter().zip(sorted).for_each(|(&id, verdict)| verdicts[id as usize] = verdict);
-    let (around, seen) = neighbourhoods(bins, exposure, &verdicts);
+    let (bin_flags, nearby) = neighbourhoods(bins, exposure, &verdicts);
     let open_parts = |clipper: &mut Clipper<'_>, ids: &[u32]| {
         let (mut out, mut parts) = (Vec::with_capacity(ids.len()), Vec::new());
         for &face in ids.iter().take_while(|_| ctx.check().is_ok()) {
             let id = face as usize;
-            clipper.open_parts(id, verdicts[id], seen[id], &around, &mut parts);
+            clipper.open_parts(id, verdicts[id], nearby[id], &bin_flags, &mut parts);
             out.extend(parts.drain(..).map(|(v, sure)| Facet { v, face, sure }));
         }
         out
@@ -105,23 +105,23 @@ fn order(bins: &Bins) -> Vec<u32> {
 
 /// The flags of each bin: whether it is a stack, and the verdicts of its faces; and for each face the combined flags of its bins.
 fn neighbourhoods(bins: &Bins, exposure: &Exposure, verdicts: &[u8]) -> (Vec<u8>, Vec<u8>) {
-    let seen: Vec<AtomicU8> = verdicts.iter().map(|_| AtomicU8::new(0)).collect();
-    let around: Vec<AtomicU8> = (0..bins.count()).map(|_| AtomicU8::new(0)).collect();
+    let nearby: Vec<AtomicU8> = verdicts.iter().map(|_| AtomicU8::new(0)).collect();
+    let bin_flags: Vec<AtomicU8> = (0..bins.count()).map(|_| AtomicU8::new(0)).collect();
     bins.for_each(|bin, ids| {
         let kind = if exposure.stacks[bin] { STACK } else { LOOSE };
         let flags = ids.iter().fold(kind, |flags, &id| flags | verdicts[id as usize] & (OPEN | BURIED));
-        around[bin].store(flags, Ordering::Relaxed);
+        bin_flags[bin].store(flags, Ordering::Relaxed);
         for &id in ids {
-            seen[id as usize].fetch_or(flags, Ordering::Relaxed);
+            nearby[id as usize].fetch_or(flags, Ordering::Relaxed);
         }
     });
     let plain = |flags: Vec<AtomicU8>| flags.into_iter().map(AtomicU8::into_inner).collect();
-    (plain(around), plain(seen))
+    (plain(bin_flags), plain(nearby))
 }
 
 /// Whether a point (fixed-point units) of a face is open.
 pub fn is_open(bins: &Bins, exposure: &Exposure, face: u32, at: Point, prisms: &mut Prisms) -> bool {
-    ahead(bins, face as usize).is_some_and(|ahead| classify(bins, exposure, at, ahead, prisms) == OPEN)
+    hair(bins, face as usize).is_some_and(|hair| classify(bins, exposure, at, hair, prisms) == OPEN)
 }
 
 /// The open parts of a small part of a face.
@@ -132,18 +132,18 @@ pub fn open_parts(
     v: &Corners,
     prisms: &mut Prisms,
 ) -> Vec<Corners> {
-    let Some(ahead) = ahead(bins, face as usize) else { return Vec::new() };
+    let Some(hair) = hair(bins, face as usize) else { return Vec::new() };
     let mut clipper = Clipper { bins, exposure, prisms: std::mem::take(prisms) };
     let mut out = Vec::new();
-    clipper.clip(*v, ahead, &mut out);
+    clipper.clip(*v, hair, &mut out);
     *prisms = clipper.prisms;
     out.into_iter().map(|(v, _)| v).collect()
 }
 
 /// [`OPEN`] or [`BURIED`], for a point of a face. It is open if the chain is present a hair behind it, and absent both a hair and [`SLIT`]
 /// in front of it, or, in a stack, [`THIN`] in front of it.
-fn classify(bins: &Bins, exposure: &Exposure, at: Point, ahead: Point, prisms: &mut Prisms) -> u8 {
-    let moved = |side: f64| [0, 1, 2].map(|axis| at[axis] + side * ahead[axis]);
+fn classify(bins: &Bins, exposure: &Exposure, at: Point, hair: Point, prisms: &mut Prisms) -> u8 {
+    let moved = |side: f64| [0, 1, 2].map(|axis| at[axis] + side * hair[axis]);
     let [front, back] = bins.windings(moved(1.0), moved(-1.0), prisms);
     if back < 1 {
         return BURIED;
@@ -155,7 +155,7 @@ fn classify(bins: &Bins, exposure: &Exposure, at: Point, ahead: Point, prisms: &
 }
 
 /// A vector of one hair along a face's normal; none for a face without area.
-fn ahead(bins: &Bins, id: usize) -> Option<Point> {
+fn hair(bins: &Bins, id: usize) -> Option<Point> {
     let normal = bins.normals[id];
     let length = dot(normal, normal).sqrt();
     (length > 0.0).then(|| normal.map(|value| value * HAIR / length))
@@ -165,25 +165,25 @@ impl Clipper<'_> {
     /// The flags of a face: [`OPEN`] and [`BURIED`], from the lines that cross it and from samples. In a stack only slivers and specks are
     /// sampled.
     fn verdict(&mut self, id: usize) -> u8 {
-        let (v, seen) = (self.bins.faces[id].v, self.exposure.faces[id]);
-        let Some(ahead) = ahead(self.bins, id) else { return seen | BURIED };
+        let (v, by_lines) = (self.bins.faces[id].v, self.exposure.faces[id]);
+        let Some(hair) = hair(self.bins, id) else { return by_lines | BURIED };
         if self.is_sliver(id) {
-            return SLIVER | self.classify(middle(&v), ahead);
+            return SLIVER | self.classify(middle(&v), hair);
         }
         let stack = self.exposure.is_stack(self.bins, voxel_of(middle(&v)));
         match stack {
-            true if is_small(&v) && self.is_speck(middle(&v), ahead) => seen | SPECK,
-            true => seen,
-            false => seen | self.sampled(&v, ahead),
+            true if is_small(&v) && self.is_speck(middle(&v), hair) => by_lines | SPECK,
+            true => by_lines,
+            false => by_lines | self.sampled(&v, hair),
         }
     }
 
     /// Whether a small face of a stack is open at its centre, and not in a slit.
-    fn is_speck(&mut self, at: Point, ahead: Point) -> bool {
-        if self.bins.crowd(voxel_of(at)) > MANY {
+    fn is_speck(&mut self, at: Point, hair: Point) -> bool {
+        if self.bins.face_count(voxel_of(at)) > MANY {
             return false;
         }
-        let moved = |side: f64| [0, 1, 2].map(|axis| at[axis] + side * ahead[axis]);
+        let moved = |side: f64| [0, 1, 2].map(|axis| at[axis] + side * hair[axis]);
         let [front, back] = self.bins.windings(moved(1.0), moved(-1.0), &mut self.prisms);
         front < 1 && back >= 1 && self.bins.windings(moved(SLIT), at, &mut self.prisms)[0] < 1
     }
@@ -195,50 +195,50 @@ impl Clipper<'_> {
     }
 
     /// [`OPEN`] and [`BURIED`], from the samples of a part of a face.
-    fn sampled(&mut self, v: &Corners, ahead: Point) -> u8 {
+    fn sampled(&mut self, v: &Corners, hair: Point) -> u8 {
         let mut flags = 0;
-        each_sample(v, SPACING, |at| flags |= if self.is_sampled(at) { self.classify(at, ahead) } else { 0 });
+        each_sample(v, SPACING, |at| flags |= if self.is_sampled(at) { self.classify(at, hair) } else { 0 });
         flags
     }
 
-    /// Adds the open parts of a face with these flags (`own`), in bins with the flags `seen`.
-    fn open_parts(&mut self, id: usize, own: u8, seen: u8, around: &[u8], out: &mut Vec<Part>) {
-        let (v, Some(ahead)) = (self.bins.faces[id].v, ahead(self.bins, id)) else { return };
-        match seen {
+    /// Adds the open parts of a face with these flags (`own`), in bins with the flags `nearby`.
+    fn open_parts(&mut self, id: usize, own: u8, nearby: u8, bin_flags: &[u8], out: &mut Vec<Part>) {
+        let (v, Some(hair)) = (self.bins.faces[id].v, hair(self.bins, id)) else { return };
+        match nearby {
             OPEN_AND_LOOSE => out.push((v, true)),
             _ if own & SPECK != 0 => out.push((v, false)),
-            _ if own == SLIVER | OPEN && seen & STACK != 0 => out.push((v, false)),
-            _ if seen & LOOSE == 0 || seen & !(STACK | LOOSE) == BURIED => {}
+            _ if own == SLIVER | OPEN && nearby & STACK != 0 => out.push((v, false)),
+            _ if nearby & LOOSE == 0 || nearby & !(STACK | LOOSE) == BURIED => {}
             _ => {
-                self.split(id, v, own & (OPEN | BURIED), ahead, around, out);
+                self.split(id, v, own & (OPEN | BURIED), hair, bin_flags, out);
             }
         }
     }
 
     /// The flags of the bins that a part of a face passes through.
-    fn seen_around(&self, id: usize, v: Corners, around: &[u8]) -> u8 {
-        let mut seen = 0;
+    fn nearby_flags(&self, id: usize, v: Corners, bin_flags: &[u8]) -> u8 {
+        let mut nearby = 0;
         each_voxel(&v, &self.bins.normals[id], &self.bins.region, |voxel| {
             if let Some(bin) = self.bins.of_voxel(voxel) {
-                seen |= around[bin];
+                nearby |= bin_flags[bin];
             }
         });
-        seen
+        nearby
     }
 
     /// Adds the open parts of a part of a face; returns whether it is open at all its samples.
-    fn dice(&mut self, id: usize, v: Corners, ahead: Point, around: &[u8], out: &mut Vec<Part>) -> bool {
-        match self.seen_around(id, v, around) {
+    fn dice(&mut self, id: usize, v: Corners, hair: Point, bin_flags: &[u8], out: &mut Vec<Part>) -> bool {
+        match self.nearby_flags(id, v, bin_flags) {
             // No flags: no distance is wanted there.
             0 | LOOSE | OPEN_AND_LOOSE => {
                 out.push((v, true));
                 true
             }
-            seen if seen & LOOSE == 0 || seen & !(STACK | LOOSE) == BURIED => false,
+            nearby if nearby & LOOSE == 0 || nearby & !(STACK | LOOSE) == BURIED => false,
             _ => {
                 let exposed = self.exposure.within(id as u32, extent(&v));
-                let own = self.sampled(&v, ahead) | if exposed { OPEN } else { 0 };
-                self.split(id, v, own, ahead, around, out)
+                let own = self.sampled(&v, hair) | if exposed { OPEN } else { 0 };
+                self.split(id, v, own, hair, bin_flags, out)
             }
         }
     }
@@ -249,16 +249,16 @@ impl Clipper<'_> {
         id: usize,
         v: Corners,
         own: u8,
-        ahead: Point,
-        around: &[u8],
+        hair: Point,
+        bin_flags: &[u8],
         out: &mut Vec<Part>,
     ) -> bool {
         let begin = out.len();
         if !is_small(&v) {
             let open = match own {
                 OPEN => true,
-                BURIED if !self.is_missed(&v, ahead, around) => false,
-                _ => halves(v).map(|half| self.dice(id, half, ahead, around, out)) == [true; 2],
+                BURIED if !self.is_missed(&v, hair, bin_flags) => false,
+                _ => halves(v).map(|half| self.dice(id, half, hair, bin_flags, out)) == [true; 2],
             };
             if open {
                 out.truncate(begin);
@@ -269,7 +269,7 @@ impl Clipper<'_> {
         if self.exposure.is_stack(self.bins, voxel_of(middle(&v))) {
             return false;
         }
-        self.clip(v, ahead, out);
+        self.clip(v, hair, out);
         if out.len() == begin && self.exposure.within(id as u32, extent(&v)) {
             out.push((v, false));
         }
@@ -277,27 +277,27 @@ impl Clipper<'_> {
     }
 
     /// Whether a part of a face that is buried at its samples is open between them, in bins with open faces.
-    fn is_missed(&mut self, v: &Corners, ahead: Point, around: &[u8]) -> bool {
+    fn is_missed(&mut self, v: &Corners, hair: Point, bin_flags: &[u8]) -> bool {
         let mut missed = false;
         each_sample(v, CLOSER, |at| {
             let bin = self.bins.of_voxel(voxel_of(at)).filter(|_| !missed);
-            let is_mixed = bin.is_some_and(|bin| around[bin] & (OPEN | STACK) == OPEN);
-            missed |= is_mixed && self.classify(at, ahead) == OPEN;
+            let is_mixed = bin.is_some_and(|bin| bin_flags[bin] & (OPEN | STACK) == OPEN);
+            missed |= is_mixed && self.classify(at, hair) == OPEN;
         });
         missed
     }
 
-    fn classify_corners(&mut self, v: Corners, ahead: Point) -> [u8; 3] {
+    fn classify_corners(&mut self, v: Corners, hair: Point) -> [u8; 3] {
         let centre = middle(&v);
-        v.map(|p| self.classify(between(p.map(f64::from), centre, INSET), ahead))
+        v.map(|p| self.classify(between(p.map(f64::from), centre, INSET), hair))
     }
 
     /// Adds the open parts of a small triangle.
-    fn clip(&mut self, v: Corners, ahead: Point, out: &mut Vec<Part>) {
-        let open = self.classify_corners(v, ahead).map(|corner| corner == OPEN);
+    fn clip(&mut self, v: Corners, hair: Point, out: &mut Vec<Part>) {
+        let open = self.classify_corners(v, hair).map(|corner| corner == OPEN);
         let centre = middle(&v);
         let count = open.iter().filter(|open| **open).count();
-        let mut middle_open = || self.classify(centre, ahead) == OPEN;
+        let mut middle_open = || self.classify(centre, hair) == OPEN;
         if count % 3 == 0 && middle_open() == open[0] {
             if open[0] {
                 out.push((v, true));
@@ -308,17 +308,17 @@ impl Clipper<'_> {
             let centre = centre.map(|value| value.round() as i32);
             let fan = [[v[0], v[1], centre], [v[1], v[2], centre], [v[2], v[0], centre]];
             let corners = [open[0], open[0], !open[0]];
-            return fan.into_iter().for_each(|part| self.clip_by(part, corners, ahead, out));
+            return fan.into_iter().for_each(|part| self.clip_by(part, corners, hair, out));
         }
-        self.clip_by(v, open, ahead, out);
+        self.clip_by(v, open, hair, out);
     }
 
     /// Adds the open part of a triangle that has open and buried corners, cut off along a straight line.
-    fn clip_by(&mut self, v: Corners, open: [bool; 3], ahead: Point, out: &mut Vec<Part>) {
+    fn clip_by(&mut self, v: Corners, open: [bool; 3], hair: Point, out: &mut Vec<Part>) {
         let alone = (0..3).find(|&i| open[i] != open[(i + 1) % 3] && open[i] != open[(i + 2) % 3]);
         let turn = alone.unwrap_or(0);
         let [a, b, c] = [0, 1, 2].map(|i| v[(turn + i) % 3]);
-        let [ab, ac] = [b, c].map(|other| self.rim(a, other, open[turn], ahead));
+        let [ab, ac] = [b, c].map(|other| self.transition(a, other, open[turn], hair));
         if open[turn] {
             out.push(([a, ab, ac], true));
         } else {
@@ -327,19 +327,19 @@ impl Clipper<'_> {
     }
 
     /// The point where an edge changes between open and buried; `open` is whether `a` is open, and `b` is the opposite.
-    fn rim(&mut self, a: Fixed, b: Fixed, open: bool, ahead: Point) -> Fixed {
+    fn transition(&mut self, a: Fixed, b: Fixed, open: bool, hair: Point) -> Fixed {
         let (a, b) = (a.map(f64::from), b.map(f64::from));
         let (mut first, mut last) = (0.0, 1.0);
         for _ in 0..HALVINGS {
             let half = (first + last) / 2.0;
-            let same = (self.classify(between(a, b, half), ahead) == OPEN) == open;
+            let same = (self.classify(between(a, b, half), hair) == OPEN) == open;
             (first, last) = if same { (half, last) } else { (first, half) };
         }
         between(a, b, (first + last) / 2.0).map(|value| value.round() as i32)
     }
 
-    fn classify(&mut self, at: Point, ahead: Point) -> u8 {
-        classify(self.bins, self.exposure, at, ahead, &mut self.prisms)
+    fn classify(&mut self, at: Point, hair: Point) -> u8 {
+        classify(self.bins, self.exposure, at, hair, &mut self.prisms)
     }
 
     /// Whether distances may be wanted near a point where patches of a stack do not provide them.

@@ -19,7 +19,9 @@ use crate::distance::winding::Lines;
 use crate::error::Result;
 use crate::geometry::DVec3;
 use crate::geometry::coords::{around, between};
-use crate::sweep::moving_mesh::passages::{Change, Passage, Place, Poses, Step, Still, face, to_f64};
+use crate::sweep::moving_mesh::passages::{
+    Change, Passage, PassageId, Poses, PreparedPose, PreparedStep, face, to_f64,
+};
 use crate::sweep::moving_mesh::topology::{Simplex, Topology};
 use crate::sweep::window::Window;
 
@@ -52,11 +54,9 @@ pub fn drop_returns(
         .map(|step| returns(ctx, &poses, step, &folded.triangles(topology, levels, step)))
         .collect::<Result<_>>()?;
     let early: Vec<Early> = found.iter().flat_map(|found| found.early.iter().copied()).collect();
-    let first: HashSet<Place> = first_ones(ctx, &poses, early)?.into_iter().collect();
-    for position in
-        found.iter().flat_map(|found| &found.positions).filter(|position| !first.contains(position))
-    {
-        outward[position.triangle as usize * steps + position.step as usize] &= !(1 << position.part);
+    let first: HashSet<PassageId> = first_rises(ctx, &poses, early)?.into_iter().collect();
+    for id in found.iter().flat_map(|found| &found.ids).filter(|id| !first.contains(id)) {
+        outward[id.triangle as usize * steps + id.step as usize] &= !(1 << id.part);
     }
     Ok(())
 }
@@ -112,17 +112,19 @@ impl Folded {
 
 /// A window grown by the largest displacement from the first pose: whatever enters the window is inside it at the first pose.
 fn grown(window: &Window, levels: &[Vec<Fixed>]) -> Window {
-    let way = |level: &Vec<Fixed>| {
-        let ways =
+    let displacement = |level: &Vec<Fixed>| {
+        let displacements =
             levels[0].iter().zip(level).map(|(from, to)| [0, 1, 2].map(|axis| from[axis].abs_diff(to[axis])));
-        ways.fold([0; 3], |most, way| [0, 1, 2].map(|axis| most[axis].max(way[axis])))
+        displacements.fold([0; 3], |max, own| [0, 1, 2].map(|axis| max[axis].max(own[axis])))
     };
-    let most =
-        levels.par_iter().map(way).reduce(|| [0; 3], |a, b| [0, 1, 2].map(|axis| a[axis].max(b[axis])));
+    let margin = levels
+        .par_iter()
+        .map(displacement)
+        .reduce(|| [0; 3], |a, b| [0, 1, 2].map(|axis| a[axis].max(b[axis])));
     let [min, max] = [window.min, window.max];
     Window {
-        min: [0, 1, 2].map(|axis| min[axis].saturating_sub_unsigned(most[axis])),
-        max: [0, 1, 2].map(|axis| max[axis].saturating_add_unsigned(most[axis])),
+        min: [0, 1, 2].map(|axis| min[axis].saturating_sub_unsigned(margin[axis])),
+        max: [0, 1, 2].map(|axis| max[axis].saturating_add_unsigned(margin[axis])),
     }
 }
 
@@ -174,7 +176,7 @@ fn negative_blocks(faces: &[Face], window: &Window) -> Vec<[i32; 3]> {
     };
     let mut out = Vec::new();
     let lines = Lines::scan(faces, &region);
-    if lines.least_winding() >= 0 {
+    if lines.min_winding() >= 0 {
         return out;
     }
     lines.each_line(|[x, y], line| {
@@ -191,7 +193,7 @@ fn negative_blocks(faces: &[Face], window: &Window) -> Vec<[i32; 3]> {
 /// The passages of a step that return from being inside out.
 #[derive(Default)]
 struct Returns {
-    positions: Vec<Place>,
+    ids: Vec<PassageId>,
     /// Their sample points with a negative winding number at the first pose, where the number may reach 0 for the first time.
     early: Vec<Early>,
 }
@@ -199,7 +201,7 @@ struct Returns {
 /// A point of a tetrahedron.
 #[derive(Clone, Copy)]
 struct Early {
-    position: Place,
+    id: PassageId,
     at: DVec3,
 }
 
@@ -215,35 +217,33 @@ fn returns(ctx: &Context, poses: &Poses<'_>, step: usize, triangles: &[u32]) -> 
         return Ok(Returns::default());
     }
     let points: Vec<DVec3> = passages.iter().flat_map(Passage::samples).collect();
-    let (during, first) = (Step::new(poses, step, &points), Still::new(poses, 0, &points));
-    let test = |passage: &Passage| -> Result<Option<(Place, Vec<Early>)>> {
+    let (during, first) = (PreparedStep::new(poses, step, &points), PreparedPose::new(poses, 0, &points));
+    let test = |passage: &Passage| -> Result<Option<(PassageId, Vec<Early>)>> {
         // A point that many faces pass takes long.
         ctx.check()?;
         let mut early = Vec::new();
         for at in passage.samples() {
-            match during.change(passage.position, &at) {
+            match during.change(passage.id, &at) {
                 Change::Counts => return Ok(None),
-                Change::Rises if first.winding(&at) < 0 => {
-                    early.push(Early { position: passage.position, at })
-                }
+                Change::Rises if first.winding(&at) < 0 => early.push(Early { id: passage.id, at }),
                 Change::Rises | Change::Returns => {}
             }
         }
-        Ok(Some((passage.position, early)))
+        Ok(Some((passage.id, early)))
     };
     let tested = passages.par_iter().with_min_len(FEW).map(test).filter_map(Result::transpose);
     let found: Vec<_> = tested.collect::<Result<_>>()?;
-    let positions = found.iter().map(|(position, _)| *position).collect();
-    Ok(Returns { positions, early: found.into_iter().flat_map(|(_, early)| early).collect() })
+    let ids = found.iter().map(|(id, _)| *id).collect();
+    Ok(Returns { ids, early: found.into_iter().flat_map(|(_, early)| early).collect() })
 }
 
 /// The passages whose points are not brought to 0 by an earlier step.
-fn first_ones(ctx: &Context, poses: &Poses<'_>, mut early: Vec<Early>) -> Result<Vec<Place>> {
+fn first_rises(ctx: &Context, poses: &Poses<'_>, mut early: Vec<Early>) -> Result<Vec<PassageId>> {
     let mut first = Vec::new();
     for step in 0..poses.levels.len() - 1 {
         early.retain(|point| {
-            let is_now = point.position.step as usize == step;
-            first.extend(is_now.then_some(point.position));
+            let is_now = point.id.step as usize == step;
+            first.extend(is_now.then_some(point.id));
             !is_now
         });
         if early.is_empty() {
@@ -251,7 +251,7 @@ fn first_ones(ctx: &Context, poses: &Poses<'_>, mut early: Vec<Early>) -> Result
         }
         ctx.check()?;
         let points: Vec<DVec3> = early.iter().map(|point| point.at).collect();
-        let during = Step::new(poses, step, &points);
+        let during = PreparedStep::new(poses, step, &points);
         early = early.into_par_iter().with_min_len(FEW).filter(|point| during.is_below(&point.at)).collect();
     }
     Ok(first)

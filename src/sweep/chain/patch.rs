@@ -26,11 +26,11 @@ const REACH: f64 = 1.0;
 /// Bisections that find where the surface leaves a patch's plane: to 1/64 of its radius.
 const HALVINGS: usize = 4;
 /// If a patch's mean radius, relative to [`REACH`], is less than this, its whole face becomes a facet too.
-const LEAST: f64 = 0.25;
+const MIN_REACH: f64 = 0.25;
 /// Spots per task: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 32;
 /// Number of directions in the patch's plane in which its radius is measured.
-const WAYS: usize = 12;
+const DIRECTIONS: usize = 12;
 
 /// Makes patches, on one thread.
 struct Patches<'a> {
@@ -72,15 +72,16 @@ impl Patches<'_> {
         let position = |[a, b]: [f64; 2], part: f64| {
             [0, 1, 2].map(|axis| centre[axis] + (a * u[axis] + b * v[axis]) * part * REACH)
         };
-        let ways: [[f64; 2]; WAYS] = std::array::from_fn(|way| {
-            let (sin, cos) = libm::sincos(std::f64::consts::TAU * way as f64 / WAYS as f64);
+        let directions: [[f64; 2]; DIRECTIONS] = std::array::from_fn(|index| {
+            let (sin, cos) = libm::sincos(std::f64::consts::TAU * index as f64 / DIRECTIONS as f64);
             [cos, sin]
         });
-        let reaches = ways.map(|way| self.reach(&normal, |part| position(way, part)));
-        let rim: [Point; WAYS] = std::array::from_fn(|index| position(ways[index], reaches[index]));
-        let facet = |index: usize| [centre, rim[index], rim[(index + 1) % WAYS]].map(fixed);
-        out.extend((0..WAYS).map(|index| Facet { v: facet(index), face, sure: true }));
-        if reaches.iter().sum::<f64>() < LEAST * WAYS as f64 {
+        let reaches = directions.map(|direction| self.reach(&normal, |part| position(direction, part)));
+        let rim: [Point; DIRECTIONS] =
+            std::array::from_fn(|index| position(directions[index], reaches[index]));
+        let facet = |index: usize| [centre, rim[index], rim[(index + 1) % DIRECTIONS]].map(fixed);
+        out.extend((0..DIRECTIONS).map(|index| Facet { v: facet(index), face, sure: true }));
+        if reaches.iter().sum::<f64>() < MIN_REACH * DIRECTIONS as f64 {
             out.push(Facet { v: self.bins.faces[face as usize].v, face, sure: false });
         }
     }
@@ -124,10 +125,10 @@ impl Patches<'_> {
 
 /// The point of a spot's plane on the line at this offset (cells) from the spot's own line.
 fn on_plane(spot: &Spot, normal: &Point, [p, q]: [f64; 2]) -> Point {
-    let way = spot.axis.beside([p, q]);
+    let offset = spot.axis.beside([p, q]);
     let mut at = spot.at();
-    let rise = -dot(*normal, way) / normal[spot.axis.index()];
-    (0..3).for_each(|axis| at[axis] += way[axis]);
+    let rise = -dot(*normal, offset) / normal[spot.axis.index()];
+    (0..3).for_each(|axis| at[axis] += offset[axis]);
     at[spot.axis.index()] += rise;
     at
 }
@@ -149,10 +150,10 @@ fn unit(v: Point) -> Point {
 
 /// Two unit vectors perpendicular to a unit vector and to each other.
 fn across(normal: Point) -> [Point; 2] {
-    let least =
-        (1..3).fold(0, |least, axis| if normal[axis].abs() < normal[least].abs() { axis } else { least });
+    let smallest = (1..3)
+        .fold(0, |smallest, axis| if normal[axis].abs() < normal[smallest].abs() { axis } else { smallest });
     let mut axis = [0.0; 3];
-    axis[least] = 1.0;
+    axis[smallest] = 1.0;
     let u = unit(cross(normal, axis));
     [u, cross(normal, u)]
 }

@@ -34,7 +34,7 @@ impl Prism {
 }
 
 /// Number of bins whose prisms are cached.
-const KEPT: usize = 12;
+const CACHED: usize = 12;
 
 /// Cache of the prisms of the bins that one thread queried last.
 #[derive(Default)]
@@ -45,7 +45,7 @@ pub struct Prisms {
     bins: Vec<usize>,
     groups: Vec<BinPrisms>,
     /// The entry that was replaced last.
-    oldest: usize,
+    last_replaced: usize,
 }
 
 impl Prisms {
@@ -61,13 +61,13 @@ impl Prisms {
         if let Some(position) = self.bins.iter().position(|&other| other == bin) {
             return &mut self.groups[position];
         }
-        let position = if self.bins.len() < KEPT {
+        let position = if self.bins.len() < CACHED {
             self.bins.push(bin);
             self.bins.len() - 1
         } else {
-            self.oldest = (self.oldest + 1) % KEPT;
-            self.bins[self.oldest] = bin;
-            self.oldest
+            self.last_replaced = (self.last_replaced + 1) % CACHED;
+            self.bins[self.last_replaced] = bin;
+            self.last_replaced
         };
         if position == self.groups.len() {
             self.groups.push(BinPrisms::default());
@@ -170,13 +170,13 @@ fn pass(groups: &[Group], points: [[f32; 3]; 3], unclear: &mut Vec<u32>) -> [i32
                 let same_side = (first > 0.0) & (last > 0.0) | (first < 0.0) & (last < 0.0);
                 let misses = sure & (same_side | (least < -CLEAR));
                 let passes = sure & !same_side & (least > CLEAR);
-                let way = if first > 0.0 { coef[lane] } else { -coef[lane] };
-                along[lane] += if passes { way } else { 0 };
+                let signed = if first > 0.0 { coef[lane] } else { -coef[lane] };
+                along[lane] += if passes { signed } else { 0 };
                 doubts[lane] = i32::from(!(misses | passes));
                 let near = (last.abs() <= BESIDE) & (least_inward(f, lane, beside) > 0.0);
                 let leaves = (last > 0.0) != (value(f, 0, lane, beside) > 0.0);
-                let way = if last > 0.0 { coef[lane] } else { -coef[lane] };
-                aside[lane] += if near & leaves { way } else { 0 };
+                let signed = if last > 0.0 { coef[lane] } else { -coef[lane] };
+                aside[lane] += if near & leaves { signed } else { 0 };
             }
             if doubts != [0; LANES] {
                 let lanes = doubts.iter().zip(0..).filter(|(doubt, _)| **doubt != 0);

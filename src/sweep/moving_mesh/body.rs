@@ -23,15 +23,15 @@ use crate::sweep::window::Window;
 /// Length of a step's path relative to the pieces that edges are split into; by measurement, this value gave the fewest faces and the
 /// shortest time.
 const SHORTER: f64 = 1.5;
-/// Steps need not be shorter than this (cells), nor more than [`MOST_OF_ARCS`] times as many as arcs need; also measured.
-const LEAST_WAY: f64 = 4.0;
-const MOST_OF_ARCS: f64 = 1.5;
+/// Steps need not be shorter than this (cells), nor more than [`MAX_OVER_ARCS`] times as many as arcs need; also measured.
+const MIN_PATH: f64 = 4.0;
+const MAX_OVER_ARCS: f64 = 1.5;
 /// Maximum number of steps in an interval between two breaks of a motion.
-const MOST_STEPS: f64 = 1024.0;
+const MAX_STEPS: f64 = 1024.0;
 /// Maximum rotation (radians) in an interval whose arcs are judged from five poses: a quarter turn.
-const TURNING: f64 = std::f64::consts::FRAC_PI_2;
+const INTERVAL_ROTATION: f64 = std::f64::consts::FRAC_PI_2;
 /// Maximum rotation in a frame (radians): 64 turns.
-const MOST_TURNING: f64 = 64.0 * std::f64::consts::TAU;
+const MAX_ROTATION: f64 = 64.0 * std::f64::consts::TAU;
 /// Bytes per vertex of a pose: in cells, in fixed point, and its share of the faces.
 const BYTES_PER_POSITION: usize = 100;
 /// Vertices or edges per task.
@@ -42,7 +42,7 @@ pub struct Body {
     motion: Box<dyn Motion>,
     shape: Arc<Shape>,
     longest_edge: f64,
-    noise: bool,
+    has_noise: bool,
     name: Option<String>,
 }
 
@@ -93,7 +93,7 @@ impl Body {
             coincident(pose.iter().copied())
         };
         let known = match known.filter(|known| known.triangles == triangles && known.exact == exact) {
-            Some(known) if known.is_welded_alike(&*motion, time)? => {
+            Some(known) if known.has_same_weld(&*motion, time)? => {
                 known.topology.complete(&mut pose);
                 (volume(&known.topology, &pose) >= 0.0).then_some(known)
             }
@@ -111,7 +111,7 @@ impl Body {
         let length = |&[i, j]: &[u32; 2]| (pose[i as usize] - pose[j as usize]).norm();
         let edges = shape.topology.edges.par_iter().with_min_len(GRAIN);
         let longest_edge = edges.map(length).reduce(|| 0.0, f64::max);
-        Ok(Self { motion, shape, longest_edge, noise: true, name: None })
+        Ok(Self { motion, shape, longest_edge, has_noise: true, name: None })
     }
 
     /// Its topology and orientation, to share with later bodies.
@@ -120,8 +120,8 @@ impl Body {
     }
 
     /// Sets whether its imprints have ragged edges (by default they do).
-    pub fn with_noise(self, noise: bool) -> Self {
-        Self { noise, ..self }
+    pub fn with_noise(self, has_noise: bool) -> Self {
+        Self { has_noise, ..self }
     }
 
     /// Sets its name, for messages.
@@ -202,7 +202,7 @@ impl Body {
 
     /// Whether its imprints have ragged edges.
     pub fn has_noise(&self) -> bool {
-        self.noise
+        self.has_noise
     }
 
     /// The motion itself.
@@ -224,12 +224,12 @@ impl Body {
         tolerance: f64,
         window: &Window,
     ) -> Result<Vec<Face>> {
-        let near = Near::new(window, self.longest_edge / lattice.voxel);
+        let near = WindowTest::new(window, self.longest_edge / lattice.voxel);
         let mut poses = self.poses(ctx, from, to, lattice, tolerance, &near)?;
         ctx.check()?;
-        let apart = self.welds_part(&poses, lattice);
+        let are_separate = self.do_welds_separate(&poses, lattice);
         let separate;
-        let topology = if apart {
+        let topology = if are_separate {
             let identity: Vec<u32> = (0..self.motion.vertex_count() as u32).collect();
             separate = Topology::new(self.triangles(), identity.len(), &identity, true);
             &separate
@@ -255,7 +255,7 @@ impl Body {
         to: f64,
         lattice: &Lattice,
         tolerance: f64,
-        near: &Near,
+        near: &WindowTest,
     ) -> Result<Vec<Vec<DVec3>>> {
         let at = |time: f64| -> Result<Vec<DVec3>> {
             ctx.check()?;
@@ -297,12 +297,12 @@ impl Body {
     /// More than 64 turns.
     pub fn turning(&self, from: f64, to: f64) -> Result<f64> {
         let turning = self.motion.turning(from, to);
-        if turning > MOST_TURNING {
+        if turning > MAX_ROTATION {
             return Err(Error::argument(format!(
                 "{} turns by {:.0} degrees in a step, more than {:.0}",
                 self.name().unwrap_or("an object"),
                 turning.to_degrees(),
-                MOST_TURNING.to_degrees()
+                MAX_ROTATION.to_degrees()
             )));
         }
         Ok(turning)
@@ -315,7 +315,7 @@ impl Body {
         let mut ends = Vec::new();
         let mut begin = from;
         for end in self.motion.breaks(from, to).into_iter().chain([to]) {
-            let parts = (self.motion.turning(begin, end) / TURNING).ceil().max(1.0);
+            let parts = (self.motion.turning(begin, end) / INTERVAL_ROTATION).ceil().max(1.0);
             ends.extend((1..parts as usize).map(|part| begin + (end - begin) * part as f64 / parts));
             ends.push(end);
             begin = end;
@@ -324,7 +324,7 @@ impl Body {
     }
 
     /// Number of equal steps an interval needs, from five poses at its quarters.
-    fn steps(&self, probes: &[&Vec<DVec3>; 5], tolerance: f64, near: &Near) -> usize {
+    fn steps(&self, probes: &[&Vec<DVec3>; 5], tolerance: f64, near: &WindowTest) -> usize {
         let bend = |vertex: usize| -> f64 {
             let path = probes.map(|probe| probe[vertex]);
             if !near.reaches(&path) {
@@ -345,18 +345,18 @@ impl Body {
                 return 0.0;
             }
             let [i, j] = edge.map(|vertex| vertex as usize);
-            let way = (ends[1][i] - ends[0][i]).norm().max((ends[1][j] - ends[0][j]).norm());
+            let path_length = (ends[1][i] - ends[0][i]).norm().max((ends[1][j] - ends[0][j]).norm());
             let length = (ends[0][i] - ends[0][j]).norm().max((ends[1][i] - ends[1][j]).norm());
-            let steps = SHORTER * (error / tolerance * way / length).sqrt();
-            steps.min((way / LEAST_WAY).max(MOST_OF_ARCS * arcs))
+            let steps = SHORTER * (error / tolerance * path_length / length).sqrt();
+            steps.min((path_length / MIN_PATH).max(MAX_OVER_ARCS * arcs))
         };
         let twists =
             self.shape.topology.edges.par_iter().with_min_len(GRAIN).map(twist).reduce(|| 0.0, f64::max);
-        arcs.max(twists).ceil().clamp(1.0, MOST_STEPS) as usize
+        arcs.max(twists).ceil().clamp(1.0, MAX_STEPS) as usize
     }
 
     /// Whether welded vertices move apart in the poses (cells) by more than the rounding of their coordinates.
-    fn welds_part(&self, poses: &[Vec<DVec3>], lattice: &Lattice) -> bool {
+    fn do_welds_separate(&self, poses: &[Vec<DVec3>], lattice: &Lattice) -> bool {
         let Shape { weld, slack, .. } = &*self.shape;
         let origin = DVec3::from(lattice.origin.map(f64::from));
         let rounding = |cells: &DVec3| {
@@ -375,13 +375,13 @@ impl Body {
 }
 
 /// Tests whether moving vertices and edges can touch the window.
-struct Near {
+struct WindowTest {
     low: DVec3,
     high: DVec3,
     longest: f64,
 }
 
-impl Near {
+impl WindowTest {
     fn new(window: &Window, longest: f64) -> Self {
         let cells = |p: Fixed| DVec3::from(p.map(|value| f64::from(value) / f64::from(UNITS)));
         Self { low: cells(window.min), high: cells(window.max), longest }
@@ -443,7 +443,7 @@ impl Shape {
     }
 
     /// Whether a motion with the same triangles and the same vertices at equal positions has the same corners at a time (s).
-    fn is_welded_alike(&self, motion: &dyn Motion, time: f64) -> Result<bool> {
+    fn has_same_weld(&self, motion: &dyn Motion, time: f64) -> Result<bool> {
         Ok(self.boundary.is_empty() || welded(motion, time, &self.exact, &self.boundary)? == self.weld)
     }
 }

@@ -30,7 +30,7 @@ pub fn face(simplex: &Simplex, level: &[Fixed]) -> Face {
 
 /// Identifies one of the tetrahedra that the surface passes through.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Place {
+pub struct PassageId {
     /// The triangle whose prism it is part of.
     pub triangle: u32,
     /// From this pose to the next.
@@ -42,7 +42,7 @@ pub struct Place {
 /// A tetrahedron that the surface passes through.
 pub struct Passage {
     /// Identifies the tetrahedron.
-    pub position: Place,
+    pub id: PassageId,
     /// 1 when the surface moves outward, -1 when inward.
     pub sign: i32,
     corners: [DVec3; 4],
@@ -75,9 +75,9 @@ impl Poses<'_> {
         let [a, b] = self.prism(step, triangle);
         let still = STILL * (a[1] - a[0]).cross(&(a[2] - a[0])).norm();
         let sign = i32::from(self.topology.simplices[triangle as usize].sign);
-        let position = move |part| Place { triangle, step: step as u32, part };
+        let id = move |part| PassageId { triangle, step: step as u32, part };
         let tetrahedra = tetrahedra(a, b).into_iter().zip(0..);
-        tetrahedra.filter_map(move |(corners, part)| Passage::new(position(part), corners, sign, still))
+        tetrahedra.filter_map(move |(corners, part)| Passage::new(id(part), corners, sign, still))
     }
 
     /// A triangle before and after a step.
@@ -88,20 +88,20 @@ impl Poses<'_> {
 }
 
 /// A pose, prepared for queries at given points.
-pub struct Still {
+pub struct PreparedPose {
     faces: Vec<[DVec3; 3]>,
     /// The faces above or below each box.
     columns: Boxes,
 }
 
-impl Still {
+impl PreparedPose {
     /// Prepares a pose for queries at these points.
     pub fn new(poses: &Poses<'_>, level: usize, points: &[DVec3]) -> Self {
         let flat = |p: DVec3| DVec3::new(p.x, p.y, 0.0);
-        let (least, most) = bounds(points);
+        let (min, max) = bounds(points);
         let is_near = |corners: &[DVec3; 3]| {
             let (low, high) = bounds(corners);
-            low.x <= most.x && high.x >= least.x && low.y <= most.y && high.y >= least.y && high.z >= least.z
+            low.x <= max.x && high.x >= min.x && low.y <= max.y && high.y >= min.y && high.z >= min.z
         };
         let corners = |simplex| face(simplex, &poses.levels[level]).v.map(to_f64);
         let faces: Vec<[DVec3; 3]> = poses.topology.simplices.iter().map(corners).filter(is_near).collect();
@@ -118,26 +118,26 @@ impl Still {
 }
 
 /// A pose and the passages to the next one, prepared for queries at given points.
-pub struct Step {
-    before: Still,
+pub struct PreparedStep {
+    before: PreparedPose,
     passages: Vec<Passage>,
     boxes: Boxes,
 }
 
-impl Step {
+impl PreparedStep {
     /// Prepares the step that begins at this pose for queries at these points.
     pub fn new(poses: &Poses<'_>, step: usize, points: &[DVec3]) -> Self {
-        let (least, most) = bounds(points);
+        let (min, max) = bounds(points);
         let is_near = |triangle: &u32| {
             let corners = poses.prism(step, *triangle);
             let (low, high) = bounds(corners.as_flattened());
-            (0..3).all(|axis| low[axis] <= most[axis] && high[axis] >= least[axis])
+            (0..3).all(|axis| low[axis] <= max[axis] && high[axis] >= min[axis])
         };
         let near = (0..poses.topology.simplices.len() as u32).filter(is_near);
         let passages: Vec<Passage> = near.flat_map(|triangle| poses.passages(step, triangle)).collect();
         let extents: Vec<_> = passages.iter().map(|passage| bounds(passage.corners)).collect();
         let boxes = Boxes::new(points.iter().copied(), &extents);
-        Self { before: Still::new(poses, step, points), passages, boxes }
+        Self { before: PreparedPose::new(poses, step, points), passages, boxes }
     }
 
     /// The passages at one of the points, with their times, in order of time.
@@ -151,11 +151,11 @@ impl Step {
     }
 
     /// The effect of a passage at one of the points.
-    pub fn change(&self, position: Place, p: &DVec3) -> Change {
+    pub fn change(&self, id: PassageId, p: &DVec3) -> Change {
         let mut winding = self.before.winding(p);
         let mut was_nonnegative = winding >= 0;
         for (_, passage) in self.passing(p) {
-            if passage.position == position {
+            if passage.id == id {
                 return match (winding >= 0, was_nonnegative) {
                     (true, _) => Change::Counts,
                     (false, true) => Change::Returns,
@@ -202,15 +202,15 @@ impl Boxes {
         let mut out =
             Self { low, edge, size: size(&edge).map(|value| value as usize), items: Lists::one(Vec::new()) };
         let mut used = vec![false; out.size.iter().product()];
-        points.for_each(|p| used[out.number(out.position(&p))] = true);
+        points.for_each(|p| used[out.number(out.box_of(&p))] = true);
         let mut pairs = Vec::new();
         for ((from, to), id) in items.iter().zip(0..) {
             if (0..3).any(|axis| to[axis] < low[axis] || from[axis] > high[axis]) {
                 continue;
             }
-            let [first, last] = [from, to].map(|p| out.position(p).map(|position| position as i32));
+            let [first, last] = [from, to].map(|p| out.box_of(p).map(|index| index as i32));
             for at in between(first, last) {
-                let number = out.number(at.map(|position| position as usize));
+                let number = out.number(at.map(|index| index as usize));
                 if used[number] {
                     pairs.push((number as u32, id));
                 }
@@ -222,11 +222,11 @@ impl Boxes {
 
     /// The items that touch the box around a point.
     fn at(&self, p: &DVec3) -> &[u32] {
-        self.items.get(self.number(self.position(p)))
+        self.items.get(self.number(self.box_of(p)))
     }
 
     /// The box around a point, or the nearest one.
-    fn position(&self, p: &DVec3) -> [usize; 3] {
+    fn box_of(&self, p: &DVec3) -> [usize; 3] {
         let position = (p - self.low).component_div(&self.edge);
         [0, 1, 2].map(|axis| (position[axis].max(0.0) as usize).min(self.size[axis] - 1))
     }
@@ -244,15 +244,15 @@ fn tetrahedra([a0, a1, a2]: [DVec3; 3], [b0, b1, b2]: [DVec3; 3]) -> [[DVec3; 4]
 
 impl Passage {
     /// The tetrahedron of a triangle of this sign; none if the surface does not move in it.
-    fn new(position: Place, corners: [DVec3; 4], sign: i32, still: f64) -> Option<Self> {
+    fn new(id: PassageId, corners: [DVec3; 4], sign: i32, still: f64) -> Option<Self> {
         let [u, v, w] = [1, 2, 3].map(|corner| corners[corner] - corners[0]);
         let volume = u.cross(&v).dot(&w);
         if volume.abs() <= still || volume == 0.0 {
             return None;
         }
-        let outward = ((volume > 0.0) == (position.part != 1)) == (sign > 0);
+        let outward = ((volume > 0.0) == (id.part != 1)) == (sign > 0);
         let weights = [v.cross(&w) / volume, w.cross(&u) / volume, u.cross(&v) / volume];
-        Some(Self { position, sign: if outward { 1 } else { -1 }, corners, weights })
+        Some(Self { id, sign: if outward { 1 } else { -1 }, corners, weights })
     }
 
     /// Its sample points.
@@ -266,10 +266,10 @@ impl Passage {
     /// When the surface passes a point (0 to 1 within the step), if the point is inside: the sum of the weights of the later pose's
     /// corners, which are the last one, two or three.
     fn time(&self, p: &DVec3) -> Option<f64> {
-        let way = p - self.corners[0];
-        let [u, v, w] = self.weights.map(|row| row.dot(&way));
+        let offset = p - self.corners[0];
+        let [u, v, w] = self.weights.map(|row| row.dot(&offset));
         let is_within = u >= 0.0 && v >= 0.0 && w >= 0.0 && u + v + w <= 1.0;
-        is_within.then_some([w, v + w, u + v + w][self.position.part as usize])
+        is_within.then_some([w, v + w, u + v + w][self.id.part as usize])
     }
 }
 

@@ -11,9 +11,9 @@ use crate::error::{Error, Result, fail_if};
 use crate::geometry::DVec3;
 
 /// Maximum number of pieces of an edge in one round.
-const MOST_PIECES: f64 = 4096.0;
+const MAX_PIECES: f64 = 4096.0;
 /// Maximum number of rounds: the edges that one round adds are split by the next.
-const MOST_ROUNDS: usize = 12;
+const MAX_ROUNDS: usize = 12;
 
 /// For messages: what needs the memory, and how to reduce it.
 const WHAT: &str =
@@ -23,7 +23,7 @@ const BYTES_PER_POSITION: u64 = 36;
 /// Bytes of a new vertex, and of the two triangles and three edges that come with it.
 const BYTES_PER_VERTEX: u64 = 150;
 /// Maximum number of bytes added in one round, whatever the context allows.
-const MOST_BYTES: u64 = 8 << 30;
+const MAX_BYTES: u64 = 8 << 30;
 
 /// Difference (cells) between the patch that an edge sweeps in a step and its two triangles.
 pub fn edge_error([before, after]: [&[DVec3]; 2], [i, j]: [u32; 2]) -> f64 {
@@ -44,16 +44,16 @@ pub fn refine(
     wanted: impl Fn([&[DVec3]; 2], [u32; 2]) -> bool + Sync,
 ) -> Result<Option<Topology>> {
     let mut refined: Option<Topology> = None;
-    for _ in 0..MOST_ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let current = refined.as_ref().unwrap_or(topology);
         debug_assert!(poses.iter().all(|pose| pose.len() == current.vertex_count()));
         let pieces = |edge: &[u32; 2]| {
             let steps = poses.windows(2).map(|pair| [&pair[0][..], &pair[1][..]]);
-            let error = steps.fold(tolerance, |most, step| {
+            let error = steps.fold(tolerance, |max, step| {
                 let error = edge_error(step, *edge);
-                if error > most && wanted(step, *edge) { error } else { most }
+                if error > max && wanted(step, *edge) { error } else { max }
             });
-            (error / tolerance).min(MOST_PIECES).ceil() as u32
+            (error / tolerance).min(MAX_PIECES).ceil() as u32
         };
         let pieces: Vec<u32> = current.edges.par_iter().with_min_len(2048).map(pieces).collect();
         if pieces.iter().all(|&pieces| pieces == 1) {
@@ -63,7 +63,7 @@ pub fn refine(
         let added: u64 = pieces.iter().map(|&pieces| u64::from(pieces - 1)).sum();
         let needed = added * (poses.len() as u64 * BYTES_PER_POSITION + BYTES_PER_VERTEX);
         ctx.allow(WHAT, needed)?;
-        fail_if(needed > MOST_BYTES, || Error::Memory { what: WHAT.into(), needed, limit: MOST_BYTES })?;
+        fail_if(needed > MAX_BYTES, || Error::Memory { what: WHAT.into(), needed, limit: MAX_BYTES })?;
         let split = Split::new(current, &pieces);
         let simplices = split.triangles(current);
         let mut derived = current.derived.clone();

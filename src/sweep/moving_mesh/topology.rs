@@ -97,14 +97,14 @@ pub struct Topology {
 }
 
 impl Topology {
-    /// Topology of a mesh's triangles; `same[v]` is the vertex that v is welded to, or v itself.
+    /// Topology of a mesh's triangles; `welded_to[v]` is the vertex that v is welded to, or v itself.
     ///
     /// With `close`, open loops are capped.
-    pub fn new(triangles: &[[u32; 3]], vertex_count: usize, same: &[u32], close: bool) -> Self {
+    pub fn new(triangles: &[[u32; 3]], vertex_count: usize, welded_to: &[u32], close: bool) -> Self {
         let mut topology = Self { own_vertices: vertex_count, ..Self::default() };
         topology.simplices.reserve(triangles.len());
         for triangle in triangles {
-            topology.push_triangle(triangle.map(|vertex| same[vertex as usize]));
+            topology.push_triangle(triangle.map(|vertex| welded_to[vertex as usize]));
         }
         topology.index_edges();
         if close {

@@ -62,12 +62,12 @@ impl Bins {
     pub fn new(faces: Vec<Face>, region: Region, marked: &[bool], lines: Lines) -> Self {
         let normals: Vec<Point> = faces.par_iter().map(normal).collect();
         let mut slots = vec![NONE; marked.len()];
-        let positions: Vec<[i32; 3]> =
-            (0..marked.len()).filter(|&block| marked[block]).map(|block| region.position(block)).collect();
-        positions.iter().enumerate().for_each(|(slot, &block)| slots[region.index(block)] = slot as u32);
-        let lists = by_block(&faces, &normals, &region, &slots, positions.len());
+        let wanted: Vec<[i32; 3]> =
+            (0..marked.len()).filter(|&block| marked[block]).map(|block| region.block(block)).collect();
+        wanted.iter().enumerate().for_each(|(slot, &block)| slots[region.index(block)] = slot as u32);
+        let lists = by_block(&faces, &normals, &region, &slots, wanted.len());
         let sort = |(slot, &position)| BlockFaces::new(position, lists.get(slot).to_vec(), &faces, &normals);
-        let mut blocks: Vec<BlockFaces> = positions.par_iter().enumerate().map(sort).collect();
+        let mut blocks: Vec<BlockFaces> = wanted.par_iter().enumerate().map(sort).collect();
         let mut count = 0;
         for block in &mut blocks {
             block.first = count;
@@ -84,7 +84,7 @@ impl Bins {
     }
 
     /// The blocks.
-    pub fn positions(&self) -> impl Iterator<Item = [i32; 3]> {
+    pub fn blocks(&self) -> impl Iterator<Item = [i32; 3]> {
         self.blocks.iter().map(|block| block.corner.map(|corner| corner >> 3))
     }
 
@@ -105,14 +105,14 @@ impl Bins {
     }
 
     /// Number of faces in the bin around a voxel.
-    pub fn crowd(&self, voxel: [i32; 3]) -> usize {
+    pub fn face_count(&self, voxel: [i32; 3]) -> usize {
         self.block_of(voxel).map_or(0, |block| block.bins.get(block.bin(voxel)).len())
     }
 
-    /// Calls `see` with the index and voxel of each bin with at least `crowd` faces, in parallel.
-    pub fn for_each_crowd(&self, crowd: usize, see: impl Fn(usize, [i32; 3]) + Sync) {
+    /// Calls `see` with the index and voxel of each bin with at least `min_faces` faces, in parallel.
+    pub fn for_each_crowded(&self, min_faces: usize, see: impl Fn(usize, [i32; 3]) + Sync) {
         self.blocks.par_iter().filter(|block| block.bins.count() > 1).for_each(|block| {
-            for bin in (0..512).filter(|&bin| block.bins.get(bin).len() >= crowd) {
+            for bin in (0..512).filter(|&bin| block.bins.get(bin).len() >= min_faces) {
                 let at = [bin >> 6, bin >> 3 & 7, bin & 7];
                 see(block.first + bin, [0, 1, 2].map(|axis| block.corner[axis] + at[axis] as i32));
             }
@@ -226,7 +226,7 @@ fn by_block(faces: &[Face], normals: &[Point], region: &Region, slots: &[u32], c
             let mut out = Vec::with_capacity(faces.len() * 2);
             for (index, face) in faces.iter().enumerate() {
                 let id = chunk * GRAIN + index;
-                each_position(&face.v, &normals[id], region, |block| {
+                each_block(&face.v, &normals[id], region, |block| {
                     let slot = slots[region.index(block)];
                     if slot != NONE {
                         out.push((slot, id as u32));
@@ -240,7 +240,7 @@ fn by_block(faces: &[Face], normals: &[Point], region: &Region, slots: &[u32], c
 }
 
 /// Calls `see` with the blocks of a region whose bins a triangle may pass through.
-fn each_position(v: &[Fixed; 3], normal: &Point, region: &Region, mut see: impl FnMut([i32; 3])) {
+fn each_block(v: &[Fixed; 3], normal: &Point, region: &Region, mut see: impl FnMut([i32; 3])) {
     let (first, last) = region.touched(extent(v), 0.5);
     let slab = Slab::new(v, normal, 4.0);
     between(first, last)
@@ -259,7 +259,7 @@ fn each_bin(v: &[Fixed; 3], normal: &Point, corner: [i32; 3], mut see: impl FnMu
 
 /// Calls `see` with the voxels of a region whose bins a triangle may pass through.
 pub fn each_voxel(v: &[Fixed; 3], normal: &Point, region: &Region, mut see: impl FnMut([i32; 3])) {
-    each_position(v, normal, region, |block| each_bin(v, normal, block.map(|b| b * 8), &mut see));
+    each_block(v, normal, region, |block| each_bin(v, normal, block.map(|b| b * 8), &mut see));
 }
 
 /// Tests whether the plane of a triangle intersects cubes of a given size.

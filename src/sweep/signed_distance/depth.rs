@@ -36,7 +36,7 @@ pub struct Volume<'a> {
 }
 
 /// The facets in reach of a block.
-pub struct Near<'a> {
+pub struct NearFacets<'a> {
     volume: Volume<'a>,
     corner: [i32; 3],
     ids: &'a [u32],
@@ -50,7 +50,7 @@ pub struct Near<'a> {
     prisms: RefCell<&'a mut Prisms>,
 }
 
-impl<'a> Near<'a> {
+impl<'a> NearFacets<'a> {
     /// `ids` are the facets in reach; `triangles` are the same facets, relative to the block's corner.
     pub fn new(
         volume: Volume<'a>,
@@ -78,25 +78,26 @@ impl<'a> Near<'a> {
         let position = at;
         let units = f64::from(UNITS);
         let at = [0, 1, 2].map(|axis| (f64::from(self.corner[axis]) + f64::from(at[axis])) * units);
-        let way = [0, 1, 2].map(|axis| v.iter().map(|p| f64::from(p[axis])).sum::<f64>() / 3.0 - at[axis]);
-        let length = way.iter().map(|value| value * value).sum::<f64>().sqrt();
+        let to_centre =
+            [0, 1, 2].map(|axis| v.iter().map(|p| f64::from(p[axis])).sum::<f64>() / 3.0 - at[axis]);
+        let length = to_centre.iter().map(|value| value * value).sum::<f64>().sqrt();
         let part = if length > INSET { INSET / length } else { 1.0 };
-        let at = [0, 1, 2].map(|axis| at[axis] + part * way[axis]);
+        let at = [0, 1, 2].map(|axis| at[axis] + part * to_centre[axis]);
         let Volume { bins, exposure, .. } = self.volume;
         let open = is_open(bins, exposure, *face, at, &mut self.prisms.borrow_mut());
         self.queried.borrow_mut()[index as usize] = (position, open);
         open
     }
 
-    /// Distance (cells) of a point from the open parts of a facet, or `most` if that is smaller.
-    fn distance_of_open(&self, index: u32, p: [f32; 3], most: f32) -> f32 {
+    /// Distance (cells) of a point from the open parts of a facet, or `limit` if that is smaller.
+    fn distance_of_open(&self, index: u32, p: [f32; 3], limit: f32) -> f32 {
         let Volume { bins, exposure, facets } = self.volume;
         let facet = &facets[self.ids[index as usize] as usize];
         let mut parts = self.parts.borrow_mut();
         let whole = parts.entry(index).or_insert_with(|| Part::new(facet.v, self.corner));
         let mut prisms = self.prisms.borrow_mut();
         let mut open = |v: &Corners| open_parts(bins, exposure, facet.face, v, &mut prisms);
-        whole.distance_of_open(p, most, self.corner, &mut open)
+        whole.distance_of_open(p, limit, self.corner, &mut open)
     }
 }
 
@@ -126,12 +127,12 @@ impl Part {
     fn distance_of_open(
         &mut self,
         p: [f32; 3],
-        most: f32,
+        limit: f32,
         corner: [i32; 3],
         open: &mut impl FnMut(&Corners) -> Vec<Corners>,
     ) -> f32 {
-        if gap(p, self.triangle.closest(p)) >= most {
-            return most;
+        if gap(p, self.triangle.closest(p)) >= limit {
+            return limit;
         }
         if matches!(self.inner, Inner::Unknown) {
             self.inner = if is_small(&self.v) {
@@ -141,11 +142,11 @@ impl Part {
             };
         }
         match &mut self.inner {
-            Inner::Unknown => most,
+            Inner::Unknown => limit,
             Inner::Halves(halves) => {
-                halves.iter_mut().fold(most, |most, half| half.distance_of_open(p, most, corner, open))
+                halves.iter_mut().fold(limit, |limit, half| half.distance_of_open(p, limit, corner, open))
             }
-            Inner::Open(parts) => parts.iter().map(|part| gap(p, part.closest(p))).fold(most, f32::min),
+            Inner::Open(parts) => parts.iter().map(|part| gap(p, part.closest(p))).fold(limit, f32::min),
         }
     }
 }
@@ -153,7 +154,7 @@ impl Part {
 /// Depths of a group's voxels: distances to their nearest facets or, where the nearest point of a facet is not open because the facet was
 /// clipped too generously, to the nearest open point.
 pub struct Depths<'a, 'n> {
-    near: &'a Near<'n>,
+    near: &'a NearFacets<'n>,
     group: &'a Group<'a>,
     /// The near triangles, then all within the limit; built on demand.
     candidates: [Option<Candidates<'a>>; 2],
@@ -166,7 +167,7 @@ struct Candidates<'a> {
 }
 
 impl<'a> Candidates<'a> {
-    fn new(near: &Near<'_>, group: &Group<'_>, ids: Cow<'a, [u32]>) -> Self {
+    fn new(near: &NearFacets<'_>, group: &Group<'_>, ids: Cow<'a, [u32]>) -> Self {
         let mut offsets = Vec::new();
         to_each(near.triangles, &ids, &group.points, &mut offsets);
         Self { ids, offsets }
@@ -175,7 +176,7 @@ impl<'a> Candidates<'a> {
 
 impl<'a, 'n> Depths<'a, 'n> {
     /// Of one group.
-    pub fn new(near: &'a Near<'n>, group: &'a Group<'a>) -> Self {
+    pub fn new(near: &'a NearFacets<'n>, group: &'a Group<'a>) -> Self {
         Self { near, group, candidates: [None, None] }
     }
 
@@ -199,7 +200,7 @@ impl<'a, 'n> Depths<'a, 'n> {
     }
 }
 
-impl Near<'_> {
+impl NearFacets<'_> {
     /// Distance (cells) of a voxel at `p` from the nearest open point of some triangles.
     fn nearest_open(&self, lane: usize, p: [f32; 3], Candidates { ids, offsets }: &Candidates<'_>) -> f32 {
         let squares = offsets.iter().map(|offset| offset.squared[lane]).zip(0..);

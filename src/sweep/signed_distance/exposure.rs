@@ -38,11 +38,11 @@ const CLOSE: f64 = 0.1;
 /// See [`CLOSE`].
 const BUNDLE: usize = 3;
 /// Only bins with at least this many faces can be stacks.
-const CROWD: usize = 32;
+const MIN_FACES: usize = 32;
 /// A gap between sheets that is narrower than this (cells) and contains no voxel counts as closed.
 const CLOSED: f64 = 0.01;
 /// A spot makes a patch if the component of the face's normal along its line is at least this share of the largest of the three.
-const STEEPEST: f64 = 0.9;
+const STEEP: f64 = 0.9;
 
 /// What lines through voxels reveal about a chain.
 pub struct Exposure {
@@ -148,8 +148,8 @@ impl Exposure {
         let bin = |spot: &Spot| bins.of_voxel(spot.at().map(|value| floor(value + 0.5)));
         let is_steep = |spot: &Spot| {
             let normal = bins.normals[spot.face as usize].map(f64::abs);
-            let most = normal.into_iter().fold(0.0, f64::max);
-            normal[spot.axis.index()] >= STEEPEST * most
+            let max = normal.into_iter().fold(0.0, f64::max);
+            normal[spot.axis.index()] >= STEEP * max
         };
         let wanted = |spot: Spot| {
             let bin = bin(&spot).filter(|&bin| self.bundles[bin])?;
@@ -200,8 +200,9 @@ impl Along {
                 a.at.total_cmp(&b.at).then((a.change, a.face).cmp(&(b.change, b.face)))
             });
         });
-        let meetings = crossings
-            .map(|line, crossings, out| walk(bins, axis, columns.coordinates(line), crossings, marks, out));
+        let meetings = crossings.map(|line, crossings, out| {
+            scan_line(bins, axis, columns.coordinates(line), crossings, marks, out)
+        });
         Self { axis, columns, meetings }
     }
 
@@ -241,7 +242,7 @@ impl Along {
 /// The columns of the lines along an axis through the bins' blocks.
 fn columns(bins: &Bins, axis: Axis) -> Columns {
     let mut columns = Columns::new(axis.line(bins.region.low), axis.line(bins.region.high));
-    bins.positions().for_each(|block| columns.add(axis.line(block)));
+    bins.blocks().for_each(|block| columns.add(axis.line(block)));
     columns
 }
 
@@ -271,7 +272,7 @@ fn crossings(bins: &Bins, axis: Axis, columns: &Columns, counts: &[AtomicU16]) -
 /// Which bins are stacks, from the number of crossings near each.
 fn stacks(bins: &Bins, counts: &[AtomicU16]) -> Vec<bool> {
     let stacks: Vec<AtomicBool> = counts.iter().map(|_| AtomicBool::new(false)).collect();
-    bins.for_each_crowd(CROWD, |bin, voxel| {
+    bins.for_each_crowded(MIN_FACES, |bin, voxel| {
         let count =
             |voxel| bins.of_voxel(voxel).map_or(0, |bin| u32::from(counts[bin].load(Ordering::Relaxed)));
         let beside = |axis: usize, step: i32| {
@@ -286,7 +287,7 @@ fn stacks(bins: &Bins, counts: &[AtomicU16]) -> Vec<bool> {
 }
 
 /// Walks along one line, marks faces and collects the meetings.
-fn walk(
+fn scan_line(
     bins: &Bins,
     axis: Axis,
     coordinates: [i32; 2],

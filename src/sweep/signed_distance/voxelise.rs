@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 
 use super::bins::Bins;
-use super::depth::{Depths, Near, Volume};
+use super::depth::{Depths, NearFacets, Volume};
 use super::exposure::Exposure;
 use crate::context::Context;
 use crate::distance::Face;
@@ -177,7 +177,7 @@ impl Voxeliser {
         pairs.iter().flatten().for_each(|&(block, _)| slots[block as usize] = 0);
         for (block, slot) in slots.iter_mut().enumerate().filter(|(_, slot)| **slot != NONE) {
             *slot = self.near.len() as u32;
-            self.near.push(self.bins.region.position(block));
+            self.near.push(self.bins.region.block(block));
         }
         let by_slot = pairs.iter().flatten().map(|&(block, id)| (slots[block as usize], id));
         self.ids = Lists::new(self.near.len(), by_slot);
@@ -273,10 +273,10 @@ impl Voxeliser {
             ids.iter().map(|&id| Triangle::new(&self.facets[id as usize].v, corner)).collect();
         let (bins, exposure, facets) = (&self.bins, &self.exposure, &self.facets[..]);
         let reach = self.band.inside;
-        let Scratch { search: memory, prisms } = scratch;
-        let near = Near::new(Volume { bins, exposure, facets }, corner, ids, &triangles, reach, prisms);
+        let Scratch { search: search_scratch, prisms } = scratch;
+        let near = NearFacets::new(Volume { bins, exposure, facets }, corner, ids, &triangles, reach, prisms);
         let mut found = false;
-        search(&triangles, self.band.reach(), wanted, memory, |group| {
+        search(&triangles, self.band.reach(), wanted, search_scratch, |group| {
             let mut depths = Depths::new(&near, group);
             for lane in 0..LANES {
                 let voxel = group.voxel(lane);
@@ -297,9 +297,9 @@ impl Voxeliser {
     /// Lowers distances to those of the nearest meetings on lines through the voxels; returns whether any was lowered.
     fn lower_by_lines(&self, block: [i32; 3], wanted: &Mask, signs: &Signs, distances: &mut Values) -> bool {
         let mut lowered = false;
-        let mut lower = |voxel: usize, most: f32| {
-            if holds(wanted, voxel) && most < distances[voxel] {
-                distances[voxel] = most;
+        let mut lower = |voxel: usize, upper: f32| {
+            if holds(wanted, voxel) && upper < distances[voxel] {
+                distances[voxel] = upper;
                 lowered = true;
             }
         };
@@ -318,7 +318,7 @@ fn mark_wanted(
 ) -> Result<Vec<bool>> {
     let near = mark_near(faces, region, reach);
     let blocks: Vec<[i32; 3]> =
-        (0..near.len()).filter(|&block| near[block]).map(|block| region.position(block)).collect();
+        (0..near.len()).filter(|&block| near[block]).map(|block| region.block(block)).collect();
     let mut marked = vec![false; region.blocks()];
     for (block, wanted) in blocks.iter().zip(wanted(&blocks)?) {
         marked[region.index(*block)] = wanted;

@@ -122,8 +122,12 @@ fn a_mesh_without_faults_stays_as_it_is() {
     for mesh in meshes {
         let repaired = repair(&context(2), &mesh, 0.1).unwrap();
         assert!(repaired.mesh == mesh && is_kept(&repaired, &mesh), "{:?}", repaired.report);
-        let RepairReport { rung, flagged_cells, rebuilt_cells, kept_triangles, .. } = repaired.report;
-        assert_eq!((rung, flagged_cells, rebuilt_cells, kept_triangles), (0, 0, 0, mesh.triangles.len()));
+        let RepairReport { rebuild_level, flagged_cells, rebuilt_cells, kept_triangles, .. } =
+            repaired.report;
+        assert_eq!(
+            (rebuild_level, flagged_cells, rebuilt_cells, kept_triangles),
+            (0, 0, 0, mesh.triangles.len())
+        );
     }
 }
 

@@ -68,7 +68,7 @@ fn drops_apart_and_bubbles_inside_are_listed() {
     let still = numbered(ball.positions.clone());
     let mut tracker = Tracker::new(&ctx, Params::for_spacing(spacing), &ball.mesh, &still).unwrap();
     let report = tracker.step(&ctx, &still, &still, 0.04).unwrap();
-    assert!(report.apart.is_empty(), "{:?}", report.apart);
+    assert!(report.uncovered_parts.is_empty(), "{:?}", report.uncovered_parts);
     // A hole in the middle, and a drop beside.
     let beside = DVec3::new(18.0 * spacing, 0.0, 0.0);
     let mut then = still.clone();
@@ -78,8 +78,9 @@ fn drops_apart_and_bubbles_inside_are_listed() {
         then.positions[*n] = at + beside;
     }
     let report = tracker.step(&ctx, &then, &then, 0.04).unwrap();
-    assert_eq!((report.apart.len(), report.flagged()), (2, 0), "{:?}", report.apart);
-    let [drop, bubble] = if report.apart[0].volume > 0.0 { [0, 1] } else { [1, 0] }.map(|n| report.apart[n]);
+    assert_eq!((report.uncovered_parts.len(), report.flagged()), (2, 0), "{:?}", report.uncovered_parts);
+    let [drop, bubble] = if report.uncovered_parts[0].volume > 0.0 { [0, 1] } else { [1, 0] }
+        .map(|n| report.uncovered_parts[n]);
     assert!((drop.position - beside).norm() < 0.2 * spacing && drop.volume > 0.0, "{drop:?}");
     assert!(bubble.position.norm() < 0.2 * spacing && bubble.volume < 0.0, "{bubble:?}");
     let unit = 4.0 / 3.0 * std::f64::consts::PI * (4.6 * spacing).powi(3);

@@ -16,12 +16,12 @@ pub(in crate::scene::surface) fn report_of(
     is_resculpted: bool,
 ) -> Report {
     let (drops, bubbles): (Vec<&UncoveredPart>, Vec<&UncoveredPart>) =
-        report.apart.iter().partition(|apart| apart.volume >= 0.0);
+        report.uncovered_parts.iter().partition(|part| part.volume >= 0.0);
     let listed: Vec<serde_json::Value> = report
-        .apart
+        .uncovered_parts
         .iter()
         .take(LISTED)
-        .map(|apart| json!({ "at_m": <[f64; 3]>::from(apart.position), "volume_m3": apart.volume }))
+        .map(|part| json!({ "at_m": <[f64; 3]>::from(part.position), "volume_m3": part.volume }))
         .collect();
     let changed = |number: fn(&Change) -> usize| report.change.as_ref().map_or(0, number);
     let results = json!({
@@ -36,7 +36,7 @@ pub(in crate::scene::surface) fn report_of(
         "uncovered": report.uncovered,
         "changed_cells": changed(|change| change.flagged_cells),
         "rebuilt_cells": changed(|change| change.rebuilt_cells),
-        "rebuilt_rung": changed(|change| change.rung),
+        "rebuilt_rung": changed(|change| change.rebuild_level),
         "matching_iterations": changed(|change| change.iterations),
         "made_triangles": changed(|change| change.made_triangles()),
         "dry_parts": changed(|change| change.dry),

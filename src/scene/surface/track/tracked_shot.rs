@@ -184,7 +184,7 @@ impl<'a> TrackedShot<'a> {
         for Eased { vertex, now: asked, next: asked_next } in self.eased(0) {
             let now = of(&moved, vertex);
             // A vertex that this step removes gets the same fraction of its next displacement as of the current one.
-            let to = match next.leads.takes(vertex) {
+            let to = match next.leads.is_replaced(vertex) {
                 true if asked != DVec3::zeros() => asked_next * (now.norm() / asked.norm()),
                 true => asked_next,
                 false => of(&then, vertex),
@@ -243,7 +243,7 @@ impl<'a> TrackedShot<'a> {
     /// The mesh at the first frame that has particles, after frames without.
     fn appear(&self, ctx: &Context, frame: i32) -> Result<At> {
         let mut at = first_mesh(ctx, self.surface, self.inputs)?;
-        at.leads = EasingTargets::cut(at.tracker.vertices().len());
+        at.leads = EasingTargets::unrelated(at.tracker.vertices().len());
         let particles = &self.inputs.particles;
         if let Some(report) = self.resculpt(ctx, &mut at, frame, particles)? {
             at.report = report_of(&report, particles.positions.len(), &at.tracker, true);
@@ -259,7 +259,7 @@ impl<'a> TrackedShot<'a> {
         let begin = At::new(before.tracker.clone(), before.source.clone(), Report::default());
         let mut at = At { detail: before.detail.clone(), ..begin };
         // The surface that was made ahead belongs to the next one.
-        before.tracker.forget_ahead();
+        before.tracker.forget_prefetched();
         let mut trail = Trail::of(at.tracker.vertices());
         let times = self.liquid.way(frame);
         let mut report = StepReport::default();
@@ -272,7 +272,7 @@ impl<'a> TrackedShot<'a> {
             let to = self.liquid.at(ends[1])?;
             let dt = (ends[1] - ends[0]) * self.liquid.file_time();
             if let Some(Ok(particles)) = behind.map(|behind| self.liquid.at(behind)) {
-                at.tracker.set_ahead(particles);
+                at.tracker.prefetch(particles);
             }
             let triangles = self.surface.eases().then(|| at.tracker.triangles().to_vec());
             let step = at.tracker.step(ctx, &from, &to, dt);
@@ -344,7 +344,7 @@ impl<'a> TrackedShot<'a> {
             corner.and_then(|corner| at.way.of_after.get(corner).copied()).unwrap_or_default()
         };
         at.way.of_after = at.tracker.vertices().iter().map(velocity).collect();
-        at.leads = std::mem::take(&mut at.leads).then(&EasingTargets::cut(at.tracker.vertices().len()));
+        at.leads = std::mem::take(&mut at.leads).then(&EasingTargets::unrelated(at.tracker.vertices().len()));
         let mesh = Arc::new(sculpt.mesh);
         at.source = Source::of(ctx, self.surface.rebuild, Some(frame), mesh.clone(), particles);
         at.detail = Some(mesh);

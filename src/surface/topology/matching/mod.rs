@@ -52,14 +52,14 @@ pub struct Matching {
     /// Distance from flagged nodes, on each axis, within which it is solved (cells), at least 1; beyond, Gamma stays.
     pub reach: i32,
     /// Maximum number of iterations.
-    pub most: usize,
+    pub max_iterations: usize,
     /// Relaxation factor of [`Solver::Sor`], at least 1 and less than 2; none: derived from the width of the space between fixed nodes.
     pub omega: Option<f64>,
 }
 
 impl Default for Matching {
     fn default() -> Self {
-        Self { solver: Solver::default(), tolerance: 0.01, reach: 12, most: 1000, omega: None }
+        Self { solver: Solver::default(), tolerance: 0.01, reach: 12, max_iterations: 1000, omega: None }
     }
 }
 
@@ -96,8 +96,8 @@ pub fn match_topology(ctx: &Context, nodes: &[Node], matching: &Matching) -> Res
     let system = System::new(&rows);
     let omega = matching.omega.unwrap_or_else(|| system.omega());
     let solved = match matching.solver {
-        Solver::Sor => system.over_relaxed(ctx, omega, matching.tolerance, matching.most)?,
-        Solver::Gradients => system.by_gradients(ctx, matching.tolerance, matching.most)?,
+        Solver::Sor => system.over_relaxed(ctx, omega, matching.tolerance, matching.max_iterations)?,
+        Solver::Gradients => system.by_gradients(ctx, matching.tolerance, matching.max_iterations)?,
     };
     let mut gamma: Vec<f32> = nodes.iter().map(|node| node.gamma).collect();
     for ((at, row), psi) in free.iter().zip(&rows).zip(&solved.psi) {
@@ -143,7 +143,7 @@ mod tests {
     const HALF: [i32; 3] = [26, 18, 18];
 
     fn matching(solver: Solver, tolerance: f64, reach: i32) -> Matching {
-        Matching { solver, tolerance, reach, most: 5000, omega: None }
+        Matching { solver, tolerance, reach, max_iterations: 5000, omega: None }
     }
 
     /// Two balls with a radius of 8, 1.5 apart. In phi they lie `shift` farther along y, and a neck has grown between them; nodes within 7
@@ -212,8 +212,8 @@ mod tests {
             .collect()
     }
 
-    fn greatest(differences: impl Iterator<Item = f32>) -> f32 {
-        differences.fold(0.0f32, |most, x| most.max(x.abs()))
+    fn max_abs(differences: impl Iterator<Item = f32>) -> f32 {
+        differences.fold(0.0f32, |max, x| max.max(x.abs()))
     }
 
     /// psi between two planes: -0.25 at x = 0 and 0.5 at x = 12.
@@ -239,7 +239,7 @@ mod tests {
             assert_eq!((out.fixed, out.free), (2 * 20, 11 * 20));
             assert!(out.iterations < 400, "{solver:?} took {}", out.iterations);
             assert!(out.residual < 1e-9, "{solver:?} left {}", out.residual);
-            let far = greatest(
+            let far = max_abs(
                 nodes.iter().zip(&out.gamma).map(|(node, out)| out - node.phi - psi(node.position[0])),
             );
             assert!(far < 1e-6, "{solver:?} is off by {far}");
@@ -260,7 +260,7 @@ mod tests {
         let plain = solve(Some(1.0));
         assert_eq!(plain.omega, 1.0);
         assert!(plain.iterations > 2 * own.iterations, "{} and {}", plain.iterations, own.iterations);
-        let far = greatest(plain.gamma.iter().zip(&own.gamma).map(|(a, b)| a - b));
+        let far = max_abs(plain.gamma.iter().zip(&own.gamma).map(|(a, b)| a - b));
         assert!(far < 1e-4, "they differ by {far}");
     }
 
@@ -274,7 +274,7 @@ mod tests {
         let outs = SOLVERS.map(|solver| solve(solver, 1, &nodes));
         assert!(outs[0].fixed > 300 && outs[0].free > 1000, "{} and {}", outs[0].fixed, outs[0].free);
         assert!(outs.iter().all(|out| out.residual < 1e-6));
-        let far = greatest(outs[0].gamma.iter().zip(&outs[1].gamma).map(|(a, b)| a - b));
+        let far = max_abs(outs[0].gamma.iter().zip(&outs[1].gamma).map(|(a, b)| a - b));
         assert!(far < 1e-4, "they differ by {far}");
         // Every 1009th node, modulo the count.
         let order: Vec<usize> = (0..nodes.len()).map(|n| n * 1009 % nodes.len()).collect();
@@ -328,7 +328,7 @@ mod tests {
             assert!(near.gamma.iter().zip(&whole.gamma).all(same), "shift {shift}");
             let flagged = nodes.iter().zip(near.gamma.iter().zip(&whole.gamma));
             let far =
-                greatest(flagged.filter(|(node, _)| node.is_flagged).map(|(_, (near, whole))| near - whole));
+                max_abs(flagged.filter(|(node, _)| node.is_flagged).map(|(_, (near, whole))| near - whole));
             assert!(far < 0.1, "shift {shift}: they differ by {far}");
         }
     }

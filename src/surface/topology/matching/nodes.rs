@@ -48,7 +48,7 @@ impl Free {
         free.iter().zip(0..).for_each(|(at, rank)| ranks[*at as usize] = rank);
         let row = |at: u32, beside: [u32; 6]| {
             let is_odd = sorted[at as usize].0.iter().fold(0, |sum, x| sum ^ x) & 1 == 1;
-            let mut row = Row { beside: [NONE; 6], held: 0, load: 0.0, is_odd, is_rim: false };
+            let mut row = Row { beside: [NONE; 6], given: 0, load: 0.0, is_odd, is_rim: false };
             for (side, other) in beside.into_iter().enumerate().filter(|(_, other)| *other != NONE) {
                 let role = roles[other as usize];
                 if role == Role::Free {
@@ -58,7 +58,7 @@ impl Free {
                 row.is_rim |= role == Role::Kept;
                 let node = &nodes[sorted[other as usize].1 as usize];
                 if role == Role::Fixed || !keeps_its_side(node) {
-                    row.held += 1;
+                    row.given += 1;
                     row.load += f64::from(node.gamma) - f64::from(node.phi);
                 }
             }
@@ -151,11 +151,11 @@ fn step(mut position: Coord, side: usize) -> Option<Coord> {
 
 /// Flagged nodes in a binary tree of boxes, split at medians. A leaf is a run of nodes on z.
 struct Flagged {
-    boxes: Vec<Part>,
+    boxes: Vec<TreeBox>,
 }
 
 /// Children of an inner box are the next box and `right`, which is 0 for a leaf.
-struct Part {
+struct TreeBox {
     low: Coord,
     high: Coord,
     right: u32,
@@ -187,7 +187,7 @@ impl Flagged {
             }
         }
         let index = self.boxes.len();
-        self.boxes.push(Part { low, high, right: 0 });
+        self.boxes.push(TreeBox { low, high, right: 0 });
         if runs.len() > 1 {
             let length = |axis: usize| i64::from(high[axis]) - i64::from(low[axis]);
             let axis = if length(0) >= length(1).max(length(2)) {

@@ -18,7 +18,7 @@ pub struct Row {
     /// The free nodes before and behind it on x, y and z, as indices of rows; [`NONE`]: there is none.
     pub beside: [u32; 6],
     /// Count of neighbours whose psi is given.
-    pub held: u32,
+    pub given: u32,
     /// Sum of their psi (cells).
     pub load: f64,
     /// Whether x + y + z is odd.
@@ -32,7 +32,7 @@ type Field = [Vec<f64>; 2];
 
 /// The nodes of one colour.
 #[derive(Default)]
-struct Half {
+struct Colour {
     /// Row of each node.
     rows: Vec<u32>,
     /// The free neighbours of each node, of the other colour; [`NONE`]: there is none.
@@ -45,7 +45,7 @@ struct Half {
 
 /// The equations of all nodes connected to given values. Where there are none, any constant would be a solution, and psi is 0.
 pub struct System {
-    halves: [Half; 2],
+    colours: [Colour; 2],
     /// Count of rows.
     count: usize,
     /// Maximum number of consecutive free nodes on any axis.
@@ -64,22 +64,22 @@ pub struct Solution {
 
 impl System {
     pub fn new(rows: &[Row]) -> Self {
-        let is_held = held(rows);
-        let mut halves = [Half::default(), Half::default()];
+        let is_connected = connected_to_given(rows);
+        let mut colours = [Colour::default(), Colour::default()];
         let mut slots = vec![NONE; rows.len()];
-        for (at, row) in rows.iter().enumerate().filter(|(at, _)| is_held[*at]) {
-            let half = &mut halves[usize::from(row.is_odd)];
-            slots[at] = half.rows.len() as u32;
+        for (at, row) in rows.iter().enumerate().filter(|(at, _)| is_connected[*at]) {
+            let colour = &mut colours[usize::from(row.is_odd)];
+            slots[at] = colour.rows.len() as u32;
             let free = row.beside.iter().filter(|beside| **beside != NONE).count();
-            half.rows.push(at as u32);
-            half.counts.push((row.held as usize + free) as f64);
-            half.loads.push(row.load);
+            colour.rows.push(at as u32);
+            colour.counts.push((row.given as usize + free) as f64);
+            colour.loads.push(row.load);
         }
         let slot = |row: u32| if row == NONE { NONE } else { slots[row as usize] };
-        for half in &mut halves {
-            half.beside = half.rows.iter().map(|at| rows[*at as usize].beside.map(slot)).collect();
+        for colour in &mut colours {
+            colour.beside = colour.rows.iter().map(|at| rows[*at as usize].beside.map(slot)).collect();
         }
-        Self { halves, count: rows.len(), widest: widest(rows, &is_held) }
+        Self { colours, count: rows.len(), widest: widest(rows, &is_connected) }
     }
 
     /// The best relaxation factor for a cube with sides of N nodes (Yang & Gobbert 2009), N being the maximum number of consecutive free
@@ -88,18 +88,25 @@ impl System {
         2.0 / (1.0 + libm::sin(std::f64::consts::PI / (f64::from(self.widest) + 1.0)))
     }
 
-    /// Solves by successive over-relaxation (Eq. 2.5) with a factor `omega` until no psi changes by `tolerance` (cells), or for `most`
+    /// Solves by successive over-relaxation (Eq. 2.5) with a factor `omega` until no psi changes by `tolerance` (cells), or for `max_iterations`
     /// iterations.
     ///
     /// # Errors
     /// Cancel.
-    pub fn over_relaxed(&self, ctx: &Context, omega: f64, tolerance: f64, most: usize) -> Result<Solution> {
+    pub fn over_relaxed(
+        &self,
+        ctx: &Context,
+        omega: f64,
+        tolerance: f64,
+        max_iterations: usize,
+    ) -> Result<Solution> {
         let mut psi = self.zeros();
         let mut iterations = 0;
-        while self.has_nodes() && iterations < most {
+        while self.has_nodes() && iterations < max_iterations {
             ctx.check()?;
             let [red, black] = &mut psi;
-            let changes = [self.halves[0].relax(omega, black, red), self.halves[1].relax(omega, red, black)];
+            let changes =
+                [self.colours[0].relax(omega, black, red), self.colours[1].relax(omega, red, black)];
             iterations += 1;
             if changes[0].max(changes[1]) < tolerance {
                 break;
@@ -108,22 +115,22 @@ impl System {
         Ok(self.solution(&psi, iterations))
     }
 
-    /// Solves by conjugate gradients until no psi changes by `tolerance` (cells), or for `most` iterations.
+    /// Solves by conjugate gradients until no psi changes by `tolerance` (cells), or for `max_iterations` iterations.
     ///
     /// The preconditioner is one symmetric pass of Gauss-Seidel (SSOR with a factor of 1): red, black, red. The thesis' incomplete Cholesky
     /// factors would need fewer iterations, but must be applied node by node.
     ///
     /// # Errors
     /// Cancel.
-    pub fn by_gradients(&self, ctx: &Context, tolerance: f64, most: usize) -> Result<Solution> {
+    pub fn by_gradients(&self, ctx: &Context, tolerance: f64, max_iterations: usize) -> Result<Solution> {
         let mut psi = self.zeros();
-        let mut residual: Field = [self.halves[0].loads.clone(), self.halves[1].loads.clone()];
+        let mut residual: Field = [self.colours[0].loads.clone(), self.colours[1].loads.clone()];
         let [mut guess, mut image] = [self.zeros(), self.zeros()];
         self.precondition(&residual, &mut guess);
         let mut direction = guess.clone();
         let mut now = product(&residual, &guess);
         let mut iterations = 0;
-        while iterations < most {
+        while iterations < max_iterations {
             ctx.check()?;
             self.apply(&direction, &mut image);
             let energy = product(&direction, &image);
@@ -134,7 +141,7 @@ impl System {
             let step = now / energy;
             combine(&mut psi, 1.0, step, &direction);
             iterations += 1;
-            if step * greatest(&direction) < tolerance {
+            if step * max_abs(&direction) < tolerance {
                 break;
             }
             combine(&mut residual, 1.0, -step, &image);
@@ -147,44 +154,44 @@ impl System {
     }
 
     fn has_nodes(&self) -> bool {
-        self.halves.iter().any(|half| !half.rows.is_empty())
+        self.colours.iter().any(|colour| !colour.rows.is_empty())
     }
 
     fn zeros(&self) -> Field {
-        self.halves.each_ref().map(|half| vec![0.0; half.rows.len()])
+        self.colours.each_ref().map(|colour| vec![0.0; colour.rows.len()])
     }
 
     fn solution(&self, psi: &Field, iterations: usize) -> Solution {
         let mut means = self.zeros();
-        for half in 0..2 {
-            self.halves[half].means(&self.halves[half].loads, &psi[1 - half], &mut means[half]);
+        for colour in 0..2 {
+            self.colours[colour].means(&self.colours[colour].loads, &psi[1 - colour], &mut means[colour]);
         }
         combine(&mut means, 1.0, -1.0, psi);
         let mut all = vec![0.0; self.count];
-        for (half, psi) in self.halves.iter().zip(psi) {
-            half.rows.iter().zip(psi).for_each(|(row, psi)| all[*row as usize] = *psi);
+        for (colour, psi) in self.colours.iter().zip(psi) {
+            colour.rows.iter().zip(psi).for_each(|(row, psi)| all[*row as usize] = *psi);
         }
-        Solution { psi: all, iterations, residual: greatest(&means) }
+        Solution { psi: all, iterations, residual: max_abs(&means) }
     }
 
     /// The preconditioner's estimate of the error behind a residual.
     fn precondition(&self, residual: &Field, guess: &mut Field) {
         let [red, black] = guess;
         // The first pass ignores the black nodes.
-        self.halves[0].means(&residual[0], &[], red);
-        self.halves[1].means(&residual[1], red, black);
-        self.halves[0].means(&residual[0], black, red);
+        self.colours[0].means(&residual[0], &[], red);
+        self.colours[1].means(&residual[1], red, black);
+        self.colours[0].means(&residual[0], black, red);
     }
 
     /// The matrix times a field.
     fn apply(&self, field: &Field, out: &mut Field) {
-        for half in 0..2 {
-            self.halves[half].apply(&field[half], &field[1 - half], &mut out[half]);
+        for colour in 0..2 {
+            self.colours[colour].apply(&field[colour], &field[1 - colour], &mut out[colour]);
         }
     }
 }
 
-impl Half {
+impl Colour {
     /// Sum of the other colour's values over a node's neighbours.
     fn sum(&self, node: usize, other: &[f64]) -> f64 {
         // The index NONE is out of range.
@@ -194,14 +201,14 @@ impl Half {
     /// Over-relaxes all nodes of the colour. Returns the maximum change (cells).
     fn relax(&self, omega: f64, other: &[f64], psi: &mut [f64]) -> f64 {
         let piece = |(piece, psi): (usize, &mut [f64])| {
-            let mut most = 0.0f64;
+            let mut max = 0.0f64;
             for (psi, node) in psi.iter_mut().zip(piece * PIECE..) {
                 let mean = (self.loads[node] + self.sum(node, other)) / self.counts[node];
                 let change = omega * (mean - *psi);
                 *psi += change;
-                most = most.max(change.abs());
+                max = max.max(change.abs());
             }
-            most
+            max
         };
         psi.par_chunks_mut(PIECE).enumerate().map(piece).reduce(|| 0.0, f64::max)
     }
@@ -226,33 +233,33 @@ impl Half {
 }
 
 /// Whether each row is connected to a given value through free nodes.
-fn held(rows: &[Row]) -> Vec<bool> {
-    let mut is_held: Vec<bool> = rows.iter().map(|row| row.held > 0).collect();
-    let mut due: Vec<u32> = (0..rows.len() as u32).filter(|at| is_held[*at as usize]).collect();
+fn connected_to_given(rows: &[Row]) -> Vec<bool> {
+    let mut is_connected: Vec<bool> = rows.iter().map(|row| row.given > 0).collect();
+    let mut due: Vec<u32> = (0..rows.len() as u32).filter(|at| is_connected[*at as usize]).collect();
     while let Some(at) = due.pop() {
         for next in rows[at as usize].beside.into_iter().filter(|next| *next != NONE) {
-            if !std::mem::replace(&mut is_held[next as usize], true) {
+            if !std::mem::replace(&mut is_connected[next as usize], true) {
                 due.push(next);
             }
         }
     }
-    is_held
+    is_connected
 }
 
 /// Maximum number of consecutive held nodes on any axis.
-fn widest(rows: &[Row], is_held: &[bool]) -> u32 {
+fn widest(rows: &[Row], is_connected: &[bool]) -> u32 {
     // Length of the run that ends at each node: rows ascend by position, so that earlier ones are known.
     let mut runs = vec![[0u32; 3]; rows.len()];
-    let mut most = 0u32;
-    for (at, row) in rows.iter().enumerate().filter(|(at, _)| is_held[*at]) {
+    let mut max = 0u32;
+    for (at, row) in rows.iter().enumerate().filter(|(at, _)| is_connected[*at]) {
         for axis in 0..3 {
             let before = row.beside[2 * axis];
             let run = 1 + if before == NONE { 0 } else { runs[before as usize][axis] };
             runs[at][axis] = run;
-            most = most.max(run);
+            max = max.max(run);
         }
     }
-    most
+    max
 }
 
 /// to = keep to + share from.
@@ -266,20 +273,20 @@ fn combine(to: &mut Field, keep: f64, share: f64, from: &Field) {
 
 /// Scalar product, summed in a fixed order.
 fn product(a: &Field, b: &Field) -> f64 {
-    let of_half = |half: usize| -> f64 {
-        let pieces = a[half].par_chunks(PIECE).zip(b[half].par_chunks(PIECE));
+    let of_colour = |colour: usize| -> f64 {
+        let pieces = a[colour].par_chunks(PIECE).zip(b[colour].par_chunks(PIECE));
         let of_piece = |(a, b): (&[f64], &[f64])| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let sums: Vec<f64> = pieces.map(of_piece).collect();
         sums.iter().sum()
     };
-    of_half(0) + of_half(1)
+    of_colour(0) + of_colour(1)
 }
 
 /// Maximum absolute value.
-fn greatest(field: &Field) -> f64 {
-    let of_piece = |piece: &[f64]| piece.iter().fold(0.0f64, |most, value| most.max(value.abs()));
-    let of_half = |half: &Vec<f64>| half.par_chunks(PIECE).map(of_piece).reduce(|| 0.0, f64::max);
-    field.iter().map(of_half).fold(0.0, f64::max)
+fn max_abs(field: &Field) -> f64 {
+    let of_piece = |piece: &[f64]| piece.iter().fold(0.0f64, |max, value| max.max(value.abs()));
+    let of_colour = |colour: &Vec<f64>| colour.par_chunks(PIECE).map(of_piece).reduce(|| 0.0, f64::max);
+    field.iter().map(of_colour).fold(0.0, f64::max)
 }
 
 #[cfg(test)]
@@ -297,8 +304,8 @@ mod tests {
             if at + 1 < loads.len() {
                 beside[1] = at as u32 + 1;
             }
-            let held = u32::from(load.is_some());
-            Row { beside, held, load: load.unwrap_or(0.0), is_odd: at % 2 == 1, is_rim: false }
+            let given = u32::from(load.is_some());
+            Row { beside, given, load: load.unwrap_or(0.0), is_odd: at % 2 == 1, is_rim: false }
         };
         loads.iter().enumerate().map(row).collect()
     }

@@ -1,9 +1,9 @@
-//! Where a tracker's mesh no longer fits its liquid after a step, and its change there.
+//! The topology update of a tracker: after each step its mesh is rebuilt where it no longer fits its liquid.
 
 use rayon::prelude::*;
 
-use super::change::{Change, Unfit, change, improved};
-use super::hidden::Everywhere;
+use super::change::{Change, FlaggedMesh, finish, rebuild};
+use super::full_check::FullCheck;
 use super::uncovered_parts::is_near;
 use crate::context::Context;
 use crate::error::Result;
@@ -13,46 +13,47 @@ use crate::surface::level_set::band::Distances;
 use crate::surface::level_set::implicit::Implicit;
 use crate::surface::params::Params;
 use crate::surface::tracked_mesh::Tracker;
-use crate::surface::tracker::{Covered, Next};
+use crate::surface::tracker::{Coverage, Next};
 
 impl Tracker {
-    /// The changed mesh where it no longer fits.
-    pub(in crate::surface) fn changed(
+    /// The change of the mesh after a step: rebuilt where it no longer fits, improved elsewhere. None if it stays as it is.
+    pub(in crate::surface) fn changed_mesh(
         &self,
         ctx: &Context,
         next: &Next,
         feet: &[Option<DVec3>],
-        covered: &Covered,
+        coverage: &Coverage,
         (phi, distances): (&Implicit, &Distances),
         particles: &[DVec3],
     ) -> Result<Option<Change>> {
-        // Vertices that never had a distance have not fitted from the start: that is no change.
+        // A vertex without a distance to keep did not fit at the first frame either: that is no change.
         let mut flags: Vec<bool> =
             next.flags.iter().zip(&next.delta).map(|(flag, delta)| *flag && !delta.is_nan()).collect();
-        self.wait_alone(&mut flags, &covered.bare);
-        let bin = |position: &DVec3| cell_of(&(position / covered.reach));
+        self.unflag_lone_jumps(&mut flags, &coverage.uncovered);
+        let bin = |position: &DVec3| cell_of(&(position / coverage.reach));
         let beside =
-            feet.iter().zip(&covered.bare).filter(|(_, is)| **is).filter_map(|(foot, _)| foot.as_ref());
+            feet.iter().zip(&coverage.uncovered).filter(|(_, is)| **is).filter_map(|(foot, _)| foot.as_ref());
         let mut beside: Vec<Coord> = beside.map(bin).collect();
         beside.par_sort_unstable();
         beside.dedup();
-        let mut bare: Vec<DVec3> =
-            covered.positions.iter().filter(|position| is_near(&beside, bin(position))).copied().collect();
-        bare.extend_from_slice(&covered.lacking.positions);
+        let mut uncovered: Vec<DVec3> =
+            coverage.positions.iter().filter(|position| is_near(&beside, bin(position))).copied().collect();
+        uncovered.extend_from_slice(&coverage.missing.positions);
         let Params { spacing, cell, change: farthest, every, .. } = self.params;
-        let specks = &covered.lacking.specks;
-        let everywhere = every.then(|| Everywhere { kept: &next.delta, spacing: 1.0 / cell, specks });
+        let specks = &coverage.missing.specks;
+        let full_check = every.then(|| FullCheck { delta: &next.delta, spacing: 1.0 / cell, specks });
         let (vertices, triangles) = (&next.vertices, &self.triangles);
-        let unfit = Unfit { vertices, triangles, flags: &flags, bare: &bare, everywhere };
-        let changed = change(ctx, &unfit, phi, distances)?;
-        let crowd = self.crowd(particles);
+        let mesh = FlaggedMesh { vertices, triangles, flags: &flags, uncovered: &uncovered, full_check };
+        let rebuilt = rebuild(ctx, &mesh, phi, distances)?;
+        let particle_count_test = self.particle_count_test(particles);
         let own = (&*self.sizes, &*next.drifts);
-        improved(ctx, &unfit, own, changed, distances, &crowd, farthest * spacing)
+        finish(ctx, &mesh, own, rebuilt, distances, &particle_count_test, farthest * spacing)
     }
 
-    /// Unflags vertices that jump alone, were placed in the last step, and have only covered surface beside them: mostly the foot slips over
-    /// a crease and comes back, and cutting a crease for it would lose much of the mesh. Lasting changes are flagged again in the next step.
-    fn wait_alone(&self, flags: &mut [bool], bare: &[bool]) {
+    /// Unflags vertices that jump while no neighbour does, were not flagged in the last step, and have only covered surface beside them. In
+    /// most such cases the foot slips over a crease and comes back; rebuilding the crease would lose much of the mesh. Lasting changes are
+    /// flagged again in the next step.
+    fn unflag_lone_jumps(&self, flags: &mut [bool], uncovered: &[bool]) {
         if !flags.contains(&true) {
             return;
         }
@@ -66,19 +67,19 @@ impl Tracker {
             }
         }
         for (at, flag) in flags.iter_mut().enumerate() {
-            *flag &= !is_alone[at] || bare[at] || self.flags[at];
+            *flag &= !is_alone[at] || uncovered[at] || self.flags[at];
         }
     }
 
-    /// Replaces the mesh by the changed one.
-    pub(in crate::surface) fn take(&mut self, change: &Change) {
+    /// Replaces the mesh by the changed one, and carries all values of vertices over.
+    pub(in crate::surface) fn apply_change(&mut self, change: &Change) {
         let mut made = change.delta.iter();
         let delta =
             |at: &Option<u32>| at.map_or_else(|| *made.next().unwrap_or(&0.0), |at| self.delta[at as usize]);
         self.delta = change.origins.iter().map(delta).collect();
         let flag = |flags: &[bool], at: &Option<u32>| at.is_some_and(|at| flags[at as usize]);
         self.flags = change.origins.iter().map(|at| flag(&self.flags, at)).collect();
-        self.bare = change.origins.iter().map(|at| flag(&self.bare, at)).collect();
+        self.never_covered = change.origins.iter().map(|at| flag(&self.never_covered, at)).collect();
         if !self.detail_retention.is_empty() {
             self.detail_retention = change.carried_shares(&self.detail_retention);
         }
@@ -103,18 +104,18 @@ mod tests {
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(&ctx, params, &mesh, &particles).unwrap();
         let none = vec![false; mesh.positions.len()];
-        let waited = |tracker: &Tracker, flagged: &[u32], bare: &[bool]| {
+        let waited = |tracker: &Tracker, flagged: &[u32], uncovered: &[bool]| {
             let mut flags = none.clone();
             flagged.iter().for_each(|at| flags[*at as usize] = true);
-            tracker.wait_alone(&mut flags, bare);
+            tracker.unflag_lone_jumps(&mut flags, uncovered);
             (0..).zip(flags).filter(|(_, flag)| *flag).map(|(at, _)| at).collect::<Vec<u32>>()
         };
         let [a, b, _] = mesh.triangles[0];
         assert!(waited(&tracker, &[a], &none).is_empty());
         assert_eq!(waited(&tracker, &[a, b], &none), [a.min(b), a.max(b)]);
-        let mut bare = none.clone();
-        bare[a as usize] = true;
-        assert_eq!(waited(&tracker, &[a], &bare), [a]);
+        let mut uncovered = none.clone();
+        uncovered[a as usize] = true;
+        assert_eq!(waited(&tracker, &[a], &uncovered), [a]);
         tracker.flags[a as usize] = true;
         assert_eq!(waited(&tracker, &[a], &none), [a]);
     }

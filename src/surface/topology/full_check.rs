@@ -1,14 +1,14 @@
-//! Topology errors that are invisible at vertices (thesis 2.8, "at every frame"): the mesh is farther from the particles' surface than its
-//! detail, though each of its vertices was projected.
+//! The full check for topology errors (thesis 2.8, "at every frame"), including those that no vertex detects: there the mesh is farther from
+//! the particles' surface than its detail, though each of its vertices was projected.
 //!
-//! A projected vertex is at its kept distance from phi = 0. So a hidden error lies between vertices, has no vertices, or is at vertices that
+//! A projected vertex is at its kept distance from phi = 0. So such an error lies between vertices, has no vertices, or is at vertices that
 //! never had a distance to keep:
 //!
 //! | what | found by |
 //! |---|---|
-//! | liquid without a mesh, a mesh without liquid | nodes inside only one of the two, farther from phi = 0 than vertices around keep |
-//! | needles, and films across a gap | positions on triangles, farther from phi = 0 than the corners keep |
-//! | hollows of the mesh that contain liquid | closed parts with a volume below 0 that lie inside phi |
+//! | liquid without a mesh, a mesh without liquid | nodes inside only one of the two, farther from phi = 0 than the vertices nearby |
+//! | needles, and films across a gap | positions on triangles that are farther from phi = 0 than the kept distances of the corners |
+//! | hollows of the mesh that contain liquid | closed parts with a volume below 0, in regions where phi is negative |
 //!
 //! Bubbles and drops that the mesh does not cover are known already (`topology/uncovered_parts.rs`).
 
@@ -36,24 +36,24 @@ use crate::surface::pieces::in_pieces;
 const SLACK: f64 = 0.5;
 /// Triangles between two checks for a cancel.
 const GRAIN: usize = 2048;
-/// A triangle in more blocks than this is tested in each block instead of being listed there.
+/// A triangle in more blocks than this is not listed in them, but tested against each block.
 const LARGE: i64 = 512;
 /// Upper bound on the rounding of vertices (cells).
 const ROUNDED: f64 = 0.01;
 /// Maximum number of positions on a triangle along an axis.
 const POSITIONS: f64 = 4096.0;
 
-/// Data for finding where a mesh does not fit, anywhere on it.
-pub struct Everywhere<'a> {
+/// The check of the whole mesh.
+pub struct FullCheck<'a> {
     /// The distance that each vertex keeps (m); NaN: it has none.
-    pub kept: &'a [f32],
+    pub delta: &'a [f32],
     /// Initial distance between particles (cells).
     pub spacing: f64,
     /// Bounds (cells) of drops that get no mesh.
     pub specks: &'a [Bounds],
 }
 
-impl Everywhere<'_> {
+impl FullCheck<'_> {
     /// Adds the cells in which a mesh does not fit though no vertex is flagged. Vertices have these positions (cells from the lattice's
     /// origin); `phi` and its distances are on the same grid.
     ///
@@ -69,10 +69,10 @@ impl Everywhere<'_> {
     ) -> Result<()> {
         let cell = distances.cell() as f32;
         // NaN becomes 0.
-        let keeps = self.kept.iter().map(|delta| (delta.abs() / cell).max(0.0)).collect();
+        let detail = self.delta.iter().map(|delta| (delta.abs() / cell).max(0.0)).collect();
         let slack = (SLACK * self.spacing).max(1.0) as f32;
         let origin = lattice.origin;
-        let mesh = Compared { shape, in_cells, kept: self.kept, keeps, slack, origin, phi, distances };
+        let mesh = Compared { shape, in_cells, delta: self.delta, detail, slack, origin, phi, distances };
         for node in mesh.differing(ctx)? {
             let position = DVec3::from(plus(node, origin).map(f64::from));
             if !self.specks.iter().any(|speck| is_within(speck, &position)) {
@@ -84,15 +84,15 @@ impl Everywhere<'_> {
     }
 }
 
-/// A mesh and the particles' surface.
+/// A mesh and the particles' surface, to be compared.
 struct Compared<'a> {
     shape: &'a Shape,
     /// Positions of vertices (cells from the lattice's origin).
     in_cells: &'a [DVec3],
-    /// See [`Everywhere::kept`].
-    kept: &'a [f32],
-    /// The magnitude of that (cells); 0 if there is none.
-    keeps: Vec<f32>,
+    /// See [`FullCheck::delta`].
+    delta: &'a [f32],
+    /// Magnitude of delta (cells); 0 if it is NaN.
+    detail: Vec<f32>,
     /// Cells.
     slack: f32,
     /// The lattice's origin.
@@ -101,11 +101,11 @@ struct Compared<'a> {
     distances: &'a Distances,
 }
 
-/// A triangle in many blocks: the lowest and the highest of them, and the maximum that its corners keep (cells).
+/// A triangle in many blocks: the minimum and maximum block, and the maximum detail of its corners (cells).
 struct Large {
     low: Coord,
     high: Coord,
-    keeps: f32,
+    detail: f32,
 }
 
 impl Large {
@@ -118,26 +118,26 @@ impl Large {
 /// Triangles by block.
 #[derive(Default)]
 struct Passed {
-    /// Maximum that corners of triangles in a block keep (cells).
-    keeps: BTreeMap<Coord, f32>,
+    /// Maximum detail of corners of triangles in a block (cells).
+    detail: BTreeMap<Coord, f32>,
     large: Vec<Large>,
 }
 
 impl Compared<'_> {
-    /// Nodes inside the mesh and outside phi, or the reverse, farther from phi = 0 than the detail there.
+    /// Nodes inside the mesh where phi is positive, or the reverse, farther from phi = 0 than the detail there.
     fn differing(&self, ctx: &Context) -> Result<Vec<Coord>> {
         let passed = self.passed(ctx)?;
         let origin = self.origin.map(|at| at >> 3);
         let known = self.distances.coords().iter().map(|block| plus(*block, origin.map(|at| -at)));
-        let mut blocks: Vec<Coord> = known.chain(passed.keeps.keys().copied()).collect();
+        let mut blocks: Vec<Coord> = known.chain(passed.detail.keys().copied()).collect();
         blocks.sort_unstable();
         blocks.dedup();
         in_pieces(ctx, &blocks, 1, |_, blocks| self.differing_in(blocks[0], &passed))
     }
 
     fn differing_in(&self, block: Coord, passed: &Passed) -> Vec<Coord> {
-        let near = around(block).into_iter().filter_map(|block| passed.keeps.get(&block).copied());
-        let large = passed.large.iter().filter(|large| large.is_near(block, 1)).map(|large| large.keeps);
+        let near = around(block).into_iter().filter_map(|block| passed.detail.get(&block).copied());
+        let large = passed.large.iter().filter(|large| large.is_near(block, 1)).map(|large| large.detail);
         let allowed = self.slack + near.chain(large).fold(0.0, f32::max);
         let there = plus(block, self.origin.map(|at| at >> 3));
         let reach = self.distances.reach_in(there);
@@ -146,7 +146,7 @@ impl Compared<'_> {
         }
         let known = self.distances.find(there).map(|slot| self.distances.values(slot));
         let is_passed =
-            passed.keeps.contains_key(&block) || passed.large.iter().any(|large| large.is_near(block, 0));
+            passed.detail.contains_key(&block) || passed.large.iter().any(|large| large.is_near(block, 0));
         // Where no triangle passes, all nodes are on the same side of the mesh.
         let first = self.is_inside(node(block, 0));
         let differs = |at: usize| {
@@ -163,19 +163,19 @@ impl Compared<'_> {
         let in_blocks = |triangles: &[[u32; 3]]| {
             ctx.check()?;
             let mut out = Passed::default();
-            for names in triangles {
-                let [a, b, c] = self.corners(names);
+            for triangle in triangles {
+                let [a, b, c] = self.corners(triangle);
                 let side = |position: DVec3, by: f64| {
                     [0, 1, 2].map(|axis| ((position[axis] + by).floor() as i32) >> 3)
                 };
                 let low = side(a.inf(&b).inf(&c), -ROUNDED);
                 let high = side(a.sup(&b).sup(&c), ROUNDED);
-                let keeps = self.most_kept(names);
+                let detail = self.max_detail(triangle);
                 let size = (0..3).map(|axis| i64::from(high[axis] - low[axis]) + 1).product::<i64>();
                 if size > LARGE {
-                    out.large.push(Large { low, high, keeps });
+                    out.large.push(Large { low, high, detail });
                 } else {
-                    between(low, high).for_each(|block| raise(&mut out.keeps, block, keeps));
+                    between(low, high).for_each(|block| raise(&mut out.detail, block, detail));
                 }
             }
             Ok(out)
@@ -184,25 +184,25 @@ impl Compared<'_> {
             self.shape.triangles.par_chunks(GRAIN).map(in_blocks).collect::<Result<_>>()?;
         let mut all = Passed::default();
         for part in parts {
-            part.keeps.into_iter().for_each(|(block, keeps)| raise(&mut all.keeps, block, keeps));
+            part.detail.into_iter().for_each(|(block, detail)| raise(&mut all.detail, block, detail));
             all.large.extend(part.large);
         }
         Ok(all)
     }
 
-    /// Cells with positions of triangles that are farther from phi = 0 than their corners keep.
+    /// Cells with positions on triangles that are farther from phi = 0 than the detail of the corners.
     fn stray(&self, ctx: &Context) -> Result<Vec<Coord>> {
         let in_cells = |sampler: &mut Sampler<'_>, triangles: &[[u32; 3]]| {
             ctx.check()?;
             let mut out = Vec::new();
-            for names in triangles {
-                let [a, b, c] = longest_first(self.corners(names));
-                // A short triangle cannot stray farther than its corners, if these are where they should be.
-                let is_known = names.iter().all(|name| !self.kept[*name as usize].is_nan());
+            for triangle in triangles {
+                let [a, b, c] = longest_first(self.corners(triangle));
+                // A short triangle is nowhere much farther from phi = 0 than its corners, if these were projected.
+                let is_known = triangle.iter().all(|vertex| !self.delta[*vertex as usize].is_nan());
                 if is_known && (b - a).norm() <= 2.0 * f64::from(self.slack) {
                     continue;
                 }
-                let allowed = self.slack + self.most_kept(names);
+                let allowed = self.slack + self.max_detail(triangle);
                 each_position([a, b, c], |position| {
                     if self.phi_at(sampler, position).abs() > allowed {
                         out.push(cell_of(&position));
@@ -220,7 +220,7 @@ impl Compared<'_> {
         Ok(lists.concat())
     }
 
-    /// Adds the cells of hollows of the mesh that lie inside phi, with everything in them.
+    /// Adds the cells of hollows of the mesh that lie where phi is negative, and of their interior.
     fn hollows(&self, ctx: &Context, set: &mut CellSet) -> Result<()> {
         let triangles = &self.shape.triangles;
         if parts(self.in_cells.len(), triangles) < 2 {
@@ -295,23 +295,23 @@ impl Compared<'_> {
         }
     }
 
-    fn corners(&self, names: &[u32; 3]) -> [DVec3; 3] {
-        names.map(|name| self.in_cells[name as usize])
+    fn corners(&self, triangle: &[u32; 3]) -> [DVec3; 3] {
+        triangle.map(|vertex| self.in_cells[vertex as usize])
     }
 
-    /// Maximum that corners keep (cells).
-    fn most_kept(&self, names: &[u32; 3]) -> f32 {
-        names.iter().map(|name| self.keeps[*name as usize]).fold(0.0, f32::max)
+    /// Maximum detail of the corners of a triangle (cells).
+    fn max_detail(&self, triangle: &[u32; 3]) -> f32 {
+        triangle.iter().map(|vertex| self.detail[*vertex as usize]).fold(0.0, f32::max)
     }
 }
 
 /// Raises the maximum of a block.
-fn raise(all: &mut BTreeMap<Coord, f32>, block: Coord, keeps: f32) {
-    let most = all.entry(block).or_default();
-    *most = most.max(keeps);
+fn raise(all: &mut BTreeMap<Coord, f32>, block: Coord, detail: f32) {
+    let max = all.entry(block).or_default();
+    *max = max.max(detail);
 }
 
-/// Calls `see` with positions on a triangle whose first edge is its longest, at most a cell apart.
+/// Calls `see` with positions on a triangle whose first edge is its longest, at max a cell apart.
 fn each_position([a, b, c]: [DVec3; 3], mut see: impl FnMut(DVec3)) {
     let length = (b - a).norm();
     let height = if length > 0.0 { (b - a).cross(&(c - a)).norm() / length } else { 0.0 };
@@ -342,7 +342,7 @@ mod tests {
         let mut tracker = Tracker::new(ctx, params, mesh, &particles).unwrap();
         for step in 0..3 {
             let report = tracker.step(ctx, &particles, &particles, 1.0 / 24.0).unwrap();
-            assert!(step > 0 || report.flagged() == 0, "a vertex tells of it");
+            assert!(step > 0 || report.flagged() == 0, "a vertex is flagged");
             assert!(every || report.change.is_none(), "step {step}");
         }
         tracker

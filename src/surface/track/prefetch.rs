@@ -1,4 +1,4 @@
-//! The surface of the coming particles, computed in advance.
+//! Prefetching: the surface of the coming particles is computed in advance.
 
 use std::sync::Arc;
 
@@ -10,16 +10,16 @@ use crate::surface::level_set::isosurface::Isosurface;
 /// The implicit function and the triangles of its zero set.
 type Surface = Arc<(Implicit, Isosurface)>;
 
-/// Data of the coming particles.
+/// The prefetched surface, or the request for it.
 #[derive(Debug, Clone, Default)]
-pub(in crate::surface) struct Ahead {
+pub(in crate::surface) struct Prefetch {
     /// Particles whose surface is to be computed during the next step.
     pub(in crate::surface) wanted: Option<Arc<Particles>>,
     /// Particles whose surface is ready, and that surface.
     pub(in crate::surface) ready: Option<(Arc<Particles>, Surface)>,
 }
 
-impl Ahead {
+impl Prefetch {
     /// The surface of particles at these positions, if it is ready.
     pub fn ready(&self, positions: &[DVec3]) -> Option<Surface> {
         self.ready
