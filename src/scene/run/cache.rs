@@ -198,10 +198,8 @@ impl Cache {
         Resumable { first, own_from: self.own_from(), done: &self.stored }
     }
 
-    /// Fails if the inputs of a frame have changed since it was made. If only its files of the coming frame ([`Reads::ahead`]) have changed
-    /// or appeared, and the frame is requested, it is left out, and so made again.
-    ///
-    /// [`Reads::ahead`]: super::stage::Reads::ahead
+    /// Fails if the inputs of a frame have changed since it was made. If only its files of the coming frame have changed or appeared, and the
+    /// frame is requested, it is left out, and so made again.
     ///
     /// # Errors
     /// The changed frame; a file that cannot be read.

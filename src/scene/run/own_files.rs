@@ -56,7 +56,6 @@ pub(super) struct OwnFiles {
     /// The folder's record, with the stages of the current run.
     known: FolderRecord,
     /// The record as it is on disk.
-    /// The record as it is on disk.
     written: Option<FolderRecord>,
 }
 
@@ -70,10 +69,9 @@ impl OwnFiles {
         let written: Option<FolderRecord> = checksummed::read(&folder.join("state").join(FILES))?;
         let mut known = written.clone().unwrap_or_default();
         for stage in stages {
-            let before = known.stages.remove(stage.name()).and_then(|started| started.frames);
-            known
-                .stages
-                .insert(stage.name().to_string(), StartedStage { frames: before, ..StartedStage::of(stage) });
+            let frames = known.stages.remove(stage.name()).and_then(|started| started.frames);
+            let started = StartedStage { frames, ..StartedStage::of(stage) };
+            known.stages.insert(stage.name().to_string(), started);
         }
         Ok(Self { folder, known, written })
     }
@@ -174,7 +172,7 @@ impl OwnFiles {
             hashes.insert(0, new.clone());
             self.save()?;
         }
-        if hash::of_file(&path).is_ok_and(|there| there == new) {
+        if hash::of_file(&path).is_ok_and(|found| found == new) {
             return Ok(());
         }
         atomic::write_bytes(&path, bytes)

@@ -21,7 +21,7 @@ use crate::io::files::source;
 use crate::io::records::input_hashes::InputHashes;
 use crate::motion::Space;
 use crate::scene::Scene;
-use crate::shallow::columns::grid::{Grid, Heights, MOST_CELLS};
+use crate::shallow::columns::grid::{Grid, Heights, MOST_CELLS, TOP};
 use crate::shallow::terrain::facing::facing;
 use crate::shallow::terrain::{Solids, triangles};
 use attached::{Attached, attach};
@@ -74,21 +74,21 @@ impl Inputs {
     /// Errors in files or keys, with file and key: liquid that does not fit; cells that need more memory than the
     /// context allows; cancel.
     pub fn load(ctx: &Context, scene: &Scene) -> Result<Self> {
-        let (shallow, frames) = (scene.shallow()?, scene.shot.frames);
-        if shallow.output.vdb && !cfg!(feature = "vdb") {
+        let (setup, frames) = (scene.shallow()?, scene.shot.frames);
+        if setup.output.vdb && !cfg!(feature = "vdb") {
             let what = "output.volume = [\"vdb\"] needs OpenVDB, which this frazil was built without";
             return Err(Error::file(&scene.path, what));
         }
-        if shallow.sequence().is_some() {
-            frames.iter().try_for_each(|frame| source::open(&shallow.terrain_at(frame)).map(drop))?;
+        if setup.sequence().is_some() {
+            frames.iter().try_for_each(|frame| source::open(&setup.terrain_at(frame)).map(drop))?;
         }
         let input_hashes = Arc::new(InputHashes::default());
-        let path = shallow.terrain_at(frames.first);
-        let mut terrain = Terrain::read(shallow, frames.first, &input_hashes)?;
+        let path = setup.terrain_at(frames.first);
+        let mut terrain = Terrain::read(setup, frames.first, &input_hashes)?;
         let bounds = terrain.bounds();
-        let grid = grid(shallow, &bounds).map_err(|error| error.in_file(&scene.path))?;
-        let heights = heights(shallow, &bounds).map_err(|error| error.in_file(&scene.path))?;
-        let mut warnings: Vec<String> = unit_warning(shallow, &path, &bounds).into_iter().collect();
+        let grid = grid(setup, &bounds).map_err(|error| error.in_file(&scene.path))?;
+        let heights = heights(setup, &bounds).map_err(|error| error.in_file(&scene.path))?;
+        let mut warnings: Vec<String> = unit_warning(setup, &path, &bounds).into_iter().collect();
         if let Terrain::Mesh(mesh) = &terrain {
             warnings.extend(rounding_warning(&path, mesh, grid.cell));
         }
@@ -101,7 +101,7 @@ impl Inputs {
         if is_turned {
             warnings.push(format!("{}: its triangles face down: they are turned round", path.display()));
         }
-        let meshes = add_meshes(shallow, frames.first, &input_hashes, &mut solids, &mut warnings)?;
+        let meshes = add_meshes(setup, frames.first, &input_hashes, &mut solids, &mut warnings)?;
         let mesh = match terrain {
             Terrain::Mesh(mesh) => Some(mesh),
             #[cfg(any(feature = "cli", feature = "vdb"))]
@@ -109,12 +109,12 @@ impl Inputs {
         };
         let triangles = mesh.as_ref().map(|mesh| mesh.triangles.len());
         let (moving_terrain, still_terrain) =
-            if shallow.sequence().is_some() { (mesh, None) } else { (None, mesh) };
+            if setup.sequence().is_some() { (mesh, None) } else { (None, mesh) };
         let still_terrain =
-            still_terrain.filter(|_| shallow.minimum_heights || shallow.skirts || shallow.staining.is_some());
-        let attached = moving_terrain.as_ref().map(|mesh| attach(ctx, shallow, mesh)).unwrap_or_default();
+            still_terrain.filter(|_| setup.minimum_heights || setup.skirts || setup.staining.is_some());
+        let attached = moving_terrain.as_ref().map(|mesh| attach(ctx, setup, mesh)).unwrap_or_default();
         if let Some(mesh) = &moving_terrain {
-            warnings.extend(attachment_warnings(scene, shallow, mesh, &attached));
+            warnings.extend(attachment_warnings(scene, setup, mesh, &attached));
         }
         let inputs = Self {
             grid,
@@ -139,10 +139,10 @@ impl Inputs {
     ///
     /// # Errors
     /// A file that cannot be read; a different mesh; a mesh that extends beyond the heights.
-    pub(super) fn terrain_at(&self, shallow: &Shallow, frame: i32) -> Result<Option<TriMesh>> {
-        let Some(first) = &self.moving else { return Ok(None) };
-        let path = shallow.terrain_at(frame);
-        let mut mesh = read_mesh(&path, shallow.space, &self.input_hashes)?;
+    pub(super) fn terrain_at(&self, setup: &Shallow, frame: i32) -> Result<Option<TriMesh>> {
+        let Some(first) = &self.moving_terrain else { return Ok(None) };
+        let path = setup.terrain_at(frame);
+        let mut mesh = read_mesh(&path, setup.space, &self.input_hashes)?;
         let other = |mesh: &TriMesh| {
             let count = |mesh: &TriMesh| {
                 format!("{} vertices and {} triangles", mesh.positions.len(), mesh.triangles.len())
@@ -154,7 +154,7 @@ impl Inputs {
             );
             Error::file(&path, what)
         };
-        // As at the first frame.
+        // Oriented as at the first frame.
         if !self.orientation.fits(mesh.triangles.len()) {
             return Err(other(&mesh));
         }
@@ -165,20 +165,24 @@ impl Inputs {
         if mesh.positions.len() != first.positions.len() || mesh.triangles != first.triangles {
             return Err(other(&mesh));
         }
+        self.check_heights(&mesh).map_err(|error| error.in_file(&path))?;
+        Ok(Some(mesh))
+    }
+
+    /// Fails if a mesh extends beyond the heights.
+    fn check_heights(&self, mesh: &TriMesh) -> Result<()> {
         let (low, high) = mesh.bounds().unwrap_or_default();
-        let range = [self.heights.low, self.heights.metres(crate::shallow::columns::grid::TOP)];
+        let [from, to] = [self.heights.low, self.heights.metres(TOP)];
         for (name, height, is_beyond) in
-            [("bottom", low.y, f64::from(low.y) < range[0]), ("top", high.y, f64::from(high.y) > range[1])]
+            [("bottom", low.y, f64::from(low.y) < from), ("top", high.y, f64::from(high.y) > to)]
         {
             if is_beyond {
-                let [from, to] = range;
-                let what = format!(
+                return Err(Error::argument(format!(
                     "reaches {height} m, beyond the heights from {from} to {to} m: give shallow.{name}"
-                );
-                return Err(Error::file(path, what));
+                )));
             }
         }
-        Ok(Some(mesh))
+        Ok(())
     }
 }
 
@@ -217,14 +221,14 @@ fn solids(
 /// # Errors
 /// A file that cannot be read, or that has too many layers.
 fn add_meshes(
-    shallow: &Shallow,
+    setup: &Shallow,
     first: i32,
     input_hashes: &InputHashes,
     solids: &mut Solids,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<TriMesh>> {
-    let mut meshes = obstacles::meshes(shallow, first, input_hashes)?;
-    for (mesh, own) in meshes.iter_mut().zip(shallow.obstacles.iter().filter_map(|own| own.file())) {
+    let mut meshes = obstacles::meshes(setup, first, input_hashes)?;
+    for (mesh, own) in meshes.iter_mut().zip(setup.obstacles.iter().filter_map(|own| own.file())) {
         let orientation = facing(mesh);
         *mesh = orientation.applied_to(std::mem::take(mesh));
         warnings.extend(orientation.warning().map(|what| format!("{}: {what}", own.display())));
@@ -247,10 +251,10 @@ pub(super) fn united(a: &Solids, b: &Solids) -> Solids {
 }
 
 /// The cells: the area's size in whole cells, centred in it.
-fn grid(shallow: &Shallow, bounds: &[DVec3; 2]) -> Result<Grid> {
+fn grid(setup: &Shallow, bounds: &[DVec3; 2]) -> Result<Grid> {
     let [low, high] = bounds;
-    let [x0, z0, x1, z1] = shallow.area.unwrap_or([low.x, low.z, high.x, high.z]);
-    let cell = shallow.cell;
+    let [x0, z0, x1, z1] = setup.area.unwrap_or([low.x, low.z, high.x, high.z]);
+    let cell = setup.cell;
     let counts = [x1 - x0, z1 - z0].map(|length| (length / cell).round().max(1.0));
     if let Some(count) = counts.into_iter().find(|count| *count > MOST_CELLS as f64) {
         return Err(Error::argument(format!(
@@ -273,12 +277,12 @@ pub(super) fn area(grid: &Grid) -> [f64; 4] {
 }
 
 /// The heights of ground and liquid.
-fn heights(shallow: &Shallow, bounds: &[DVec3; 2]) -> Result<Heights> {
+fn heights(setup: &Shallow, bounds: &[DVec3; 2]) -> Result<Heights> {
     let [low, high] = bounds.each_ref().map(|corner| corner.y);
     let margin = (MARGIN.0 * (high - low)).max(MARGIN.1);
-    let below = if shallow.sequence().is_some() { low - margin } else { low };
-    let bottom = shallow.bottom.unwrap_or(below);
-    let top = shallow.top.unwrap_or(high.max(shallow.fill.unwrap_or(high)) + margin);
+    let below = if setup.sequence().is_some() { low - margin } else { low };
+    let bottom = setup.bottom.unwrap_or(below);
+    let top = setup.top.unwrap_or(high.max(setup.fill.unwrap_or(high)) + margin);
     if top <= bottom {
         return Err(Error::argument(format!(
             "the heights of ground and liquid go from {bottom} m up to {top} m: give shallow.bottom and shallow.top"
@@ -290,7 +294,7 @@ fn heights(shallow: &Shallow, bounds: &[DVec3; 2]) -> Result<Heights> {
 /// Warnings about points that are attached to a position to one side of them, as if given high above a slope.
 fn attachment_warnings(
     scene: &Scene,
-    shallow: &Shallow,
+    setup: &Shallow,
     mesh: &TriMesh,
     attached: &[Option<Attached>],
 ) -> Vec<String> {
@@ -298,7 +302,7 @@ fn attachment_warnings(
         let [x, y, z] = attached.as_ref()?.position(mesh);
         let [own_x, _, own_z] = point.point.at;
         let off = ((x - own_x).powi(2) + (z - own_z).powi(2)).sqrt();
-        (off > point.point.radius.max(2.0 * shallow.cell)).then(|| {
+        (off > point.point.radius.max(2.0 * setup.cell)).then(|| {
             format!(
                 "{}: {}: the point of the terrain that is nearest to it, with which it moves, lies {off:.6} m beside it, at ({x:.6}, {y:.6}, {z:.6})",
                 scene.path.display(),
@@ -306,13 +310,13 @@ fn attachment_warnings(
             )
         })
     };
-    shallow.points.iter().zip(attached).filter_map(warning).collect()
+    setup.points.iter().zip(attached).filter_map(warning).collect()
 }
 
-/// The warning about a mesh that is probably in another unit.
-fn unit_warning(shallow: &Shallow, path: &Path, [low, high]: &[DVec3; 2]) -> Option<String> {
+/// The warning about a terrain that is probably in another unit.
+fn unit_warning(setup: &Shallow, path: &Path, [low, high]: &[DVec3; 2]) -> Option<String> {
     let size = high - low;
-    let is_mesh = shallow.image.is_none() && shallow.space.scale == Space::OWN.scale;
+    let is_mesh = setup.image.is_none() && setup.space.scale == Space::OWN.scale;
     (is_mesh && size.x.max(size.z) > MAX_LIKELY_WIDTH).then(|| {
         format!(
             "{}: the terrain is {:.1} x {:.1} x {:.1} m (x, y, z): shallow.scale = 0.001 takes millimetres, 0.01 centimetres",

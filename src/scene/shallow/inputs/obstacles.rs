@@ -60,8 +60,8 @@ impl Obstacle {
 ///
 /// # Errors
 /// None for a scene that was read.
-pub(in crate::scene::shallow) fn shapes_at(shallow: &Shallow, frame: i32) -> Result<Vec<Shape>> {
-    shallow.obstacles.iter().filter_map(|obstacle| obstacle.shape(frame).transpose()).collect()
+pub(in crate::scene::shallow) fn shapes_at(setup: &Shallow, frame: i32) -> Result<Vec<Shape>> {
+    setup.obstacles.iter().filter_map(|obstacle| obstacle.shape(frame).transpose()).collect()
 }
 
 /// The obstacles that are meshes, in the file's order (m).
@@ -69,11 +69,11 @@ pub(in crate::scene::shallow) fn shapes_at(shallow: &Shallow, frame: i32) -> Res
 /// # Errors
 /// A file that cannot be read.
 pub(in crate::scene::shallow) fn meshes(
-    shallow: &Shallow,
+    setup: &Shallow,
     first: i32,
     input_hashes: &InputHashes,
 ) -> Result<Vec<TriMesh>> {
-    shallow.obstacles.iter().filter_map(|obstacle| obstacle.mesh(first, input_hashes).transpose()).collect()
+    setup.obstacles.iter().filter_map(|obstacle| obstacle.mesh(first, input_hashes).transpose()).collect()
 }
 
 /// Points of each ring of a sphere's mesh, and rings from its bottom to its middle.

@@ -42,12 +42,12 @@ impl Terrain {
     ///
     /// # Errors
     /// A file that cannot be read, has changed since it was read, or needs a feature that this build lacks.
-    pub fn read(shallow: &Shallow, frame: i32, input_hashes: &InputHashes) -> Result<Self> {
-        let path = shallow.terrain_at(frame);
-        match (&*extension(&path), shallow.image) {
+    pub fn read(setup: &Shallow, frame: i32, input_hashes: &InputHashes) -> Result<Self> {
+        let path = setup.terrain_at(frame);
+        match (&*extension(&path), setup.image) {
             ("vdb", _) => of_vdb(&path, input_hashes),
             ("png", Some(placement)) => of_image(&path, placement, input_hashes),
-            _ => Ok(Self::Mesh(read_mesh(&path, shallow.space, input_hashes)?)),
+            _ => Ok(Self::Mesh(read_mesh(&path, setup.space, input_hashes)?)),
         }
     }
 
