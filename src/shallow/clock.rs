@@ -14,8 +14,8 @@ pub enum Clock {
 
 impl Clock {
     /// Starts a clock.
-    pub fn start(are_several: bool) -> Self {
-        if are_several {
+    pub fn start(is_multithreaded: bool) -> Self {
+        if is_multithreaded {
             Self::Wall(Instant::now())
         } else {
             Self::Thread(clock_gettime(ClockId::ThreadCPUTime))

@@ -8,43 +8,43 @@ use std::sync::atomic::AtomicBool;
 
 use super::clock::Clock;
 use super::params::TimeStepping;
-use super::solver::rows::bands::attended;
+use super::solver::rows::bands::with_spinning_threads;
 use super::solver::stop::Stop;
 use super::system::{Report, Shallow};
-use super::time_step::{self, LENGTHS, MOST_STEPS, Measures, Next};
+use super::time_step::{self, FrameProgress, LENGTHS, MAX_STEPS, Measures};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::numeric::checks::ensure;
 use crate::numeric::cpu::FlushDenormals;
 use crate::numeric::digits;
 
-/// Columns times steps from which on a frame may take long: some 20 ms.
-const LONG: f64 = (1 << 21) as f64;
+/// Columns times steps above which a frame may take long: some 20 ms.
+const LONG_FRAME: f64 = (1 << 21) as f64;
 /// Fixed cost of a step, in columns.
-const EACH: f64 = 1024.0;
+const STEP_COST: f64 = 1024.0;
 /// Cost of a column that may be full, in columns: its head is found iteratively.
-const FULL: f64 = 16.0;
+const FULL_COST: f64 = 16.0;
 
 /// Checks the length of a frame.
 pub(super) fn check_length(dt: f64) -> Result<()> {
     if LENGTHS.contains(&dt) {
         return Ok(());
     }
-    Err(outside("frame", dt))
+    Err(out_of_range("frame", dt))
 }
 
 /// The error for a length (s) of a frame or a step that is out of range.
-fn outside(noun: &str, length: f64) -> Error {
-    let (least, most) = LENGTHS.into_inner();
-    let [least, most] = [least, most].map(digits::end);
-    Error::argument(format!("a {noun} of {} s is not within {least} to {most} s", digits::given(length)))
+fn out_of_range(noun: &str, length: f64) -> Error {
+    let (min, max) = LENGTHS.into_inner();
+    let [min, max] = [min, max].map(digits::end);
+    Error::argument(format!("a {noun} of {} s is not within {min} to {max} s", digits::given(length)))
 }
 
 /// The error for a frame that would take too many steps; raised after some of them.
 pub(super) fn too_many_steps(dt: f64, done: f64, length: f64) -> Error {
     let [dt, done, length] = [dt, done, length].map(digits::given);
     Error::argument(format!(
-        "a frame of {dt} s takes over {MOST_STEPS} steps: after {done} s they are of {length} s"
+        "a frame of {dt} s takes over {MAX_STEPS} steps: after {done} s they are of {length} s"
     ))
 }
 
@@ -52,14 +52,14 @@ impl Shallow {
     /// One frame of `dt` (s), 1e-12 to 1e6.
     ///
     /// Cancellation is checked at the start and, if the frame may take long (exact steps; over some two million columns times steps; many
-    /// full columns), every few milliseconds. The caller's thread does all the work; with many columns, the threads of its pool do, and
-    /// they are entered once. With a pool without threads, nothing is allocated, locked, logged or polled, except that the list of steps
+    /// full columns), every few milliseconds. The caller's thread does all the work; with many columns, the context's pool does, and
+    /// the pool is entered once. With a pool without threads, nothing is allocated, locked, logged or polled, except that the list of steps
     /// may grow.
     ///
     /// # Errors
     /// `Argument`: dt out of range, or over a million steps needed. `Cancelled`. In either case the liquid is as it was.
     pub fn step(&mut self, ctx: &Context, dt: f64) -> Result<Report> {
-        self.frame(ctx, dt, None, |pace| Some(time_step::next(pace)))
+        self.frame(ctx, dt, None, |progress| Some(time_step::next_length(progress)))
     }
 
     /// As [`Shallow::step`], but the frame ends early, and the rest of its time is dropped, once the calling thread has worked for `budget`
@@ -71,7 +71,9 @@ impl Shallow {
     pub fn step_within(&mut self, ctx: &Context, dt: f64, budget: f64) -> Result<Report> {
         ensure(budget > 0.0, format_args!("a budget of {budget} s is not positive"))?;
         let clock = Clock::start(self.flow.divide(&self.columns, ctx.pool().threads()));
-        let next = |pace: &Next| (pace.steps == 0 || clock.seconds() < budget).then(|| time_step::next(pace));
+        let next = |progress: &FrameProgress| {
+            (progress.steps == 0 || clock.seconds() < budget).then(|| time_step::next_length(progress))
+        };
         self.frame(ctx, dt, None, next)
     }
 
@@ -81,9 +83,9 @@ impl Shallow {
     /// As [`Shallow::step`].
     pub fn replay(&mut self, ctx: &Context, steps: &[f64]) -> Result<Report> {
         if let Some(step) = steps.iter().find(|step| !LENGTHS.contains(*step)) {
-            return Err(outside("step", *step));
+            return Err(out_of_range("step", *step));
         }
-        let next = |pace: &Next| steps.get(pace.steps as usize).copied();
+        let next = |progress: &FrameProgress| steps.get(progress.steps as usize).copied();
         self.frame(ctx, steps.iter().sum(), Some(steps.len()), next)
     }
 
@@ -93,7 +95,7 @@ impl Shallow {
         ctx: &Context,
         dt: f64,
         count: Option<usize>,
-        next: impl Fn(&Next) -> Option<f64> + Send,
+        next: impl Fn(&FrameProgress) -> Option<f64> + Send,
     ) -> Result<Report> {
         check_length(dt)?;
         let running = ctx.begin_light();
@@ -103,28 +105,30 @@ impl Shallow {
         let cancel = running.latch();
         if self.flow.divide(&self.columns, ctx.pool().threads()) {
             let threads = ctx.pool().threads();
-            ctx.pool().install(|| attended(threads, || self.whole(dt, count, next, cancel)))
+            ctx.pool().install(|| {
+                with_spinning_threads(threads, || self.frame_or_rollback(dt, count, next, cancel))
+            })
         } else {
             let _flush = FlushDenormals::begin();
-            self.whole(dt, count, next, cancel)
+            self.frame_or_rollback(dt, count, next, cancel)
         }
     }
 
-    /// Makes the whole frame or leaves the liquid as it was.
-    fn whole(
+    /// Makes all steps, or restores the liquid.
+    fn frame_or_rollback(
         &mut self,
         dt: f64,
         count: Option<usize>,
-        next: impl Fn(&Next) -> Option<f64>,
+        next: impl Fn(&FrameProgress) -> Option<f64>,
         cancel: &AtomicBool,
     ) -> Result<Report> {
         if !self.may_take_long(dt, count) {
-            return self.steps(dt, next, &Stop::NEVER);
+            return self.run_thickened(dt, next, &Stop::NEVER);
         }
-        self.keep();
-        let result = self.steps(dt, next, &Stop::when(cancel));
+        self.save_rollback();
+        let result = self.run_thickened(dt, next, &Stop::when(cancel));
         if result.is_err() {
-            self.put_kept_back();
+            self.roll_back();
         }
         result
     }
@@ -137,49 +141,59 @@ impl Shallow {
             (None, TimeStepping::Realtime(longest)) => (dt / longest).max(1.0),
         };
         let [wet, full] = self.flow.work(&self.columns).map(|count| count as f64);
-        steps * (EACH + wet + FULL * full) > LONG
+        steps * (STEP_COST + wet + FULL_COST * full) > LONG_FRAME
     }
 
-    fn keep(&mut self) {
-        let mut kept = std::mem::take(&mut self.kept);
-        // Reserved once: not again when the liquid spreads.
-        kept.state.clear();
-        kept.state.reserve(self.most_save_size());
-        self.save_into(&mut kept.state);
-        kept.steps.clone_from(&self.steps);
-        self.kept = kept;
+    fn save_rollback(&mut self) {
+        let mut saved = std::mem::take(&mut self.rollback);
+        // The maximum size: it is not reserved again when the liquid spreads.
+        saved.state.clear();
+        saved.state.reserve(self.most_save_size());
+        self.save_into(&mut saved.state);
+        saved.steps.clone_from(&self.steps);
+        self.rollback = saved;
     }
 
-    fn put_kept_back(&mut self) {
-        let kept = std::mem::take(&mut self.kept);
-        self.put_back(&kept.state);
-        self.steps.clone_from(&kept.steps);
-        self.kept = kept;
+    fn roll_back(&mut self) {
+        let saved = std::mem::take(&mut self.rollback);
+        self.put_back(&saved.state);
+        self.steps.clone_from(&saved.steps);
+        self.rollback = saved;
     }
 
-    /// The steps of a frame, with the viscosity that the scalars have at its beginning.
-    fn steps(&mut self, dt: f64, next: impl Fn(&Next) -> Option<f64>, stop: &Stop) -> Result<Report> {
+    /// Makes the steps of a frame, with the viscosities that follow from the scalars at its beginning.
+    fn run_thickened(
+        &mut self,
+        dt: f64,
+        next: impl Fn(&FrameProgress) -> Option<f64>,
+        stop: &Stop,
+    ) -> Result<Report> {
         let Self { params, thick, columns, flow, pipes, .. } = &mut *self;
-        let Some(law) = params.thickening else { return self.flow_on(dt, next, stop) };
+        let Some(law) = params.thickening else { return self.run_steps(dt, next, stop) };
         thick.begin(&law, columns, flow, pipes)?;
-        let report = self.flow_on(dt, next, stop);
+        let report = self.run_steps(dt, next, stop);
         self.thick.end(&mut self.pipes);
         report
     }
 
-    fn flow_on(&mut self, dt: f64, next: impl Fn(&Next) -> Option<f64>, stop: &Stop) -> Result<Report> {
+    fn run_steps(
+        &mut self,
+        dt: f64,
+        next: impl Fn(&FrameProgress) -> Option<f64>,
+        stop: &Stop,
+    ) -> Result<Report> {
         let measures: Measures = self.measures();
         let mut report = Report::default();
-        let halvings = self.begin(dt, &measures, &next);
+        let halvings = self.begin_frame(dt, &measures, &next);
         while report.seconds < dt {
             let left = dt - report.seconds;
-            let state = self.next(&measures, left, report.steps, halvings);
+            let state = self.progress(&measures, left, report.steps, halvings);
             let Some(length) = next(&state) else { break };
-            if report.steps == 0 && left / length > f64::from(MOST_STEPS) || report.steps >= MOST_STEPS {
+            if report.steps == 0 && left / length > f64::from(MAX_STEPS) || report.steps >= MAX_STEPS {
                 return Err(too_many_steps(dt, report.seconds, length));
             }
             self.advance(&measures, length, &mut report, stop);
-            if stop.is_asked() {
+            if stop.is_requested() {
                 return Err(Error::Cancelled);
             }
             report.seconds = if length >= left { dt } else { report.seconds + length };

@@ -63,7 +63,7 @@ impl Liquid {
     }
 
     /// Viscosity under strong shear (m2/s).
-    pub fn least_viscosity(&self) -> f64 {
+    pub fn min_viscosity(&self) -> f64 {
         self.thinning.map_or(self.viscosity, |law| law.thinnest)
     }
 

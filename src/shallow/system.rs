@@ -4,7 +4,7 @@ use super::columns::Columns;
 use super::columns::grid::BOTTOMLESS;
 use super::free_fall::Falling;
 use super::params::{Friction, Params, Section};
-use super::pipes::cliffs::beside;
+use super::pipes::cliffs::index_beyond;
 use super::pipes::pipe_rules::{ExcludedCells, Rules};
 use super::pipes::side::Side;
 use super::pipes::{Border, Pipes};
@@ -13,11 +13,11 @@ use super::scalars::amounts::Account;
 use super::solver::Flow;
 use super::solver::overflow_edges::OverflowEdges;
 use super::solver::stop::Stop;
-use super::solver::thickening::Thick;
+use super::solver::thickening::ThickenedPipes;
 use super::sources::{FlowPoint, Flows};
 use super::terrain::Solids;
 use super::terrain::identity::Identity;
-use super::time_step::{self, Measures, Next};
+use super::time_step::{self, FrameProgress, Measures};
 use crate::context::Context;
 use crate::error::Result;
 use crate::numeric::checks::ensure;
@@ -33,15 +33,15 @@ pub struct Shallow {
     pub(super) flows: Flows,
     pub(super) remap: Remap,
     pub(super) falls: Falling,
-    pub(super) thick: Thick,
-    /// The state before the frame, kept if the frame may take so long that it can be cancelled: it is put back then.
-    pub(super) kept: SavedState,
+    pub(super) thick: ThickenedPipes,
+    /// The state before a frame that may take long, restored if that fails or is cancelled.
+    pub(super) rollback: Rollback,
     /// Cells that belong to another liquid.
-    pub(super) apart: Option<ExcludedCells>,
+    pub(super) excluded: Option<ExcludedCells>,
     /// Units poured in, less those removed, other than by flow points.
     pub(super) poured: i64,
     /// Surface of the liquid at rest beyond an absorbing border (units), or BOTTOMLESS.
-    pub(super) still: i32,
+    pub(super) still_level: i32,
     /// Seconds since the start.
     pub(super) time: f64,
     /// Lengths of the last frame's steps (s).
@@ -97,39 +97,42 @@ impl Shallow {
     /// # Errors
     /// `Argument`: numbers out of range; a terrain without a surface in the domain. `Memory`: more than the context allows.
     pub fn new(ctx: &Context, solids: &Solids, params: Params) -> Result<Self> {
-        Self::beside(ctx, solids, params, None)
+        Self::new_excluding(ctx, solids, params, None)
     }
 
     /// As [`Shallow::new`], but without the cells that belong to another liquid.
-    pub(super) fn beside(
+    pub(super) fn new_excluding(
         ctx: &Context,
         solids: &Solids,
         params: Params,
-        apart: Option<ExcludedCells>,
+        excluded: Option<ExcludedCells>,
     ) -> Result<Self> {
         params.validate()?;
         solids.grid.validate()?;
         let count: usize = (0..solids.grid.cells()).map(|cell| solids.cell(cell).len()).sum();
-        ensure(count > 0 || apart.is_some(), "the terrain has no surface that faces up within the domain")?;
+        ensure(
+            count > 0 || excluded.is_some(),
+            "the terrain has no surface that faces up within the domain",
+        )?;
         let has_walls = params.friction == Friction::Walls;
-        let bytes = if has_walls { BYTES + WALLS } else { BYTES };
+        let bytes = if has_walls { COLUMN_BYTES + FRICTION_BYTES } else { COLUMN_BYTES };
         ctx.allow("the columns of the liquid", count as u64 * bytes)?;
         let columns = Columns::new(solids);
         let falls = params.falls.as_ref();
-        let pipes = Pipes::with_rules(&columns, Rules::of(&params, &columns, apart.as_ref()));
+        let pipes = Pipes::with_rules(&columns, Rules::of(&params, &columns, excluded.as_ref()));
         let mut flow = Flow::new(&columns, &pipes);
         if has_walls {
-            flow.walls.turn_on(&columns);
+            flow.friction.enable(&columns);
         }
         if falls.is_some() {
             flow.overflow_edges = OverflowEdges::with_room(pipes.links.len());
         }
         Ok(Self {
-            remap: Remap::new(falls.map_or(0, |falls| falls.most)),
+            remap: Remap::new(falls.map_or(0, |falls| falls.max_packets)),
             falls: Falling::new(falls, pipes.links.len()),
-            thick: Thick::none(),
-            kept: SavedState::default(),
-            apart,
+            thick: ThickenedPipes::none(),
+            rollback: Rollback::default(),
+            excluded,
             params,
             flow,
             pipes,
@@ -137,7 +140,7 @@ impl Shallow {
             identity: Identity::new(),
             flows: Flows::default(),
             poured: 0,
-            still: BOTTOMLESS,
+            still_level: BOTTOMLESS,
             time: 0.0,
             steps: Vec::with_capacity(1024),
         })
@@ -158,7 +161,7 @@ impl Shallow {
         ensure(params.falls == self.params.falls, "falls cannot change after the liquid was made")?;
         ensure(params.friction == self.params.friction, "friction cannot change after the liquid was made")?;
         if params != self.params {
-            self.flow.rouse();
+            self.flow.wake_all();
         }
         self.params = params;
         Ok(())
@@ -229,9 +232,9 @@ impl Shallow {
     /// Fills all columns up to a height (m), or their ceiling; those that are fuller stay as they are. The level beyond an absorbing border
     /// is set to this height, too.
     pub fn fill(&mut self, height: f64) {
-        self.still = self.columns.heights.round(height);
-        self.flow.rouse();
-        let level = i64::from(self.still);
+        self.still_level = self.columns.heights.round(height);
+        self.flow.wake_all();
+        let level = i64::from(self.still_level);
         for index in 0..self.columns.len() {
             if self.columns.is_column(index) {
                 let missing =
@@ -243,12 +246,17 @@ impl Shallow {
         }
     }
 
-    /// Begins a frame; returns how many times its steps are halved for fast films.
-    pub(super) fn begin(&mut self, dt: f64, measures: &Measures, next: impl Fn(&Next) -> Option<f64>) -> u32 {
+    /// Begins a frame; returns how many times its steps are halved because of fast films.
+    pub(super) fn begin_frame(
+        &mut self,
+        dt: f64,
+        measures: &Measures,
+        next: impl Fn(&FrameProgress) -> Option<f64>,
+    ) -> u32 {
         self.steps.clear();
-        self.flow.begin_frame(&self.columns, &self.pipes, time_step::bounds(&self.params, measures));
-        self.release();
-        self.find_fast(dt, measures, next)
+        self.flow.begin_frame(&self.columns, &self.pipes, time_step::rest_bounds(&self.params, measures));
+        self.settle_held();
+        self.find_fast_films(dt, measures, next)
     }
 
     /// One step of a length (s), counted in a report.
@@ -256,7 +264,7 @@ impl Shallow {
         let step = time_step::step(&self.params, measures, length, self.flow.last);
         self.find_overflow_edges();
         let [emptied, filled, slowed] = self.flow.step(&self.columns, &self.pipes, &step, length, stop);
-        self.fall(length);
+        self.advance_falling(length);
         self.flows.step(&self.columns, &mut self.flow, -self.params.gravity[1], self.time, length);
         self.steps.push(length);
         self.time += length;
@@ -267,19 +275,24 @@ impl Shallow {
     }
 
     /// The progress of the frame, with `left` (s) to go.
-    pub(super) fn next<'a>(
+    pub(super) fn progress<'a>(
         &'a self,
         measures: &'a Measures,
         left: f64,
         steps: u32,
         halvings: u32,
-    ) -> Next<'a> {
+    ) -> FrameProgress<'a> {
         let deepest = measures.unit * f64::from(self.flow.bands.deepest());
-        Next { params: &self.params, measures, left, deepest, steps, last: self.flow.last, halvings }
+        FrameProgress { params: &self.params, measures, left, deepest, steps, last: self.flow.last, halvings }
     }
 
-    /// Finds the fast films of a frame, and how many times its steps have to be halved for them.
-    fn find_fast(&mut self, dt: f64, measures: &Measures, next: impl Fn(&Next) -> Option<f64>) -> u32 {
+    /// Finds the fast films of a frame; returns how many times its steps must be halved for them.
+    fn find_fast_films(
+        &mut self,
+        dt: f64,
+        measures: &Measures,
+        next: impl Fn(&FrameProgress) -> Option<f64>,
+    ) -> u32 {
         let Params { liquid, section, .. } = self.params;
         if liquid.viscosity == 0.0 || section == Section::Whole {
             self.flow.fast.clear();
@@ -287,13 +300,13 @@ impl Shallow {
         }
         let last = self.flow.last;
         let drive = time_step::drive(&self.params, measures, last);
-        let longest = time_step::next(&self.next(measures, dt, 0, 0));
-        let farthest = 1 << time_step::most_halvings(&self.params);
-        let cells = self.flow.find_fast(&self.columns, drive, longest / last, farthest);
+        let longest = time_step::next_length(&self.progress(measures, dt, 0, 0));
+        let max_cells = 1 << time_step::max_halvings(&self.params);
+        let cells = self.flow.find_fast_films(&self.columns, drive, longest / last, max_cells);
         let halvings = cells.trailing_zeros();
-        if let Some(length) = next(&self.next(measures, dt, 0, halvings)) {
+        if let Some(length) = next(&self.progress(measures, dt, 0, halvings)) {
             let step = time_step::step(&self.params, measures, length, last);
-            self.flow.lighten(drive, &step);
+            self.flow.reduce_inertia(drive, &step);
         }
         halvings
     }
@@ -302,8 +315,8 @@ impl Shallow {
         Measures {
             cell: self.columns.grid.cell,
             unit: self.columns.heights.unit,
-            pipes: self.pipes.links.most,
-            still: if self.params.border == Border::Absorbing { self.still } else { BOTTOMLESS },
+            pipes: self.pipes.links.max_pipes,
+            still_level: if self.params.border == Border::Absorbing { self.still_level } else { BOTTOMLESS },
         }
     }
 
@@ -337,7 +350,7 @@ impl Shallow {
         }
         let [east, south] = &self.flow.flux;
         let inflow =
-            |flux: &[f32], side| beside(&self.columns, index, side).map_or(0.0, |before| flux[before]);
+            |flux: &[f32], side| index_beyond(&self.columns, index, side).map_or(0.0, |before| flux[before]);
         let (west, north) = (inflow(east, Side::West), inflow(south, Side::North));
         let scale = (0.5 * self.columns.grid.cell / self.flow.last) as f32 / depth as f32;
         [(east[index] + west) * scale, (south[index] + north) * scale]
@@ -379,13 +392,13 @@ impl Units {
 }
 
 /// Bytes of a column with its pipes, and its share of a strip's data.
-const BYTES: u64 = 64;
+const COLUMN_BYTES: u64 = 64;
 /// Additional bytes for friction at walls.
-const WALLS: u64 = 108;
+const FRICTION_BYTES: u64 = 108;
 
 /// The state at the beginning of a frame, and the steps of the frame before.
 #[derive(Debug, Default)]
-pub(super) struct SavedState {
+pub(super) struct Rollback {
     pub state: Vec<u8>,
     pub steps: Vec<f64>,
 }

@@ -11,7 +11,7 @@ use super::solver::viscous_flux::{Step, Thinning};
 /// Steps are shorter than the stability limit by this factor.
 const SAFETY: f64 = 0.9;
 /// Maximum count of steps in a frame: a frame that needs more is refused.
-pub const MOST_STEPS: u32 = 1_000_000;
+pub const MAX_STEPS: u32 = 1_000_000;
 /// Range of lengths of frames, and of the steps of a replay (s). In shorter ones nothing would move, and coefficients would exceed single
 /// precision.
 pub const LENGTHS: RangeInclusive<f64> = 1e-12..=1e6;
@@ -26,17 +26,17 @@ pub struct Measures {
     /// Maximum count of pipes of a column.
     pub pipes: usize,
     /// Surface of the liquid at rest beyond the border (units), or BOTTOMLESS.
-    pub still: i32,
+    pub still_level: i32,
 }
 
 /// The longest stable step (s) for liquid of a depth (m): the largest dt with P g A' dt^2 / dx^2 <= 1/q + zeta, for P pipes a column, and
 /// 1/q = 1 + 3 dt nu / H^2. With four pipes and no loss this is dt = dx / (c sqrt 2). Infinite where nothing limits it, as on dry ground.
 /// `frame` is the time left in the frame (s).
-pub fn longest(params: &Params, measures: &Measures, depth: f64, frame: f64) -> f64 {
+pub fn longest_stable(params: &Params, measures: &Measures, depth: f64, frame: f64) -> f64 {
     let g = -params.gravity[1];
     let height = if params.section == Section::Wetted { depth } else { measures.cell };
     let a = measures.pipes as f64 * g * height / (measures.cell * measures.cell);
-    let b = if depth > 0.0 { 3.0 * least_viscosity(params) / (depth * depth) } else { 0.0 };
+    let b = if depth > 0.0 { 3.0 * min_viscosity(params) / (depth * depth) } else { 0.0 };
     let c = 1.0 + libm::pow(params.kept, frame);
     if a <= 0.0 || !b.is_finite() {
         return f64::INFINITY;
@@ -45,9 +45,9 @@ pub fn longest(params: &Params, measures: &Measures, depth: f64, frame: f64) -> 
 }
 
 /// The minimum viscosity (m2/s) of the liquid.
-fn least_viscosity(params: &Params) -> f64 {
+fn min_viscosity(params: &Params) -> f64 {
     let times = params.thickening.map_or(1.0, |law| law.times.min(1.0));
-    params.liquid.least_viscosity() * times
+    params.liquid.min_viscosity() * times
 }
 
 /// The maximum depth (m) in a pipe's section at which steps of `dt` are stable without viscosity.
@@ -57,7 +57,7 @@ fn deepest_section(params: &Params, measures: &Measures, dt: f64) -> f64 {
 }
 
 /// State of the frame when its next step is chosen.
-pub struct Next<'a> {
+pub struct FrameProgress<'a> {
     /// Parameters.
     pub params: &'a Params,
     /// Measures of the domain.
@@ -74,15 +74,15 @@ pub struct Next<'a> {
     pub halvings: u32,
 }
 
-/// A step keeps the last length while that is at least this part of the stable one: each change of the length adds energy to waves.
+/// A step keeps the last length while that is at least this part of the longest stable one: each change of the length adds energy to waves.
 const STEADY: f64 = 0.45;
 
 /// The length of the next step (s).
-pub fn next(at: &Next) -> f64 {
+pub fn next_length(at: &FrameProgress) -> f64 {
     let halved = f64::from(1 << at.halvings);
     let longest = match at.params.pace {
         TimeStepping::Exact => {
-            let longest = longest(at.params, at.measures, at.deepest, at.left) / halved;
+            let longest = longest_stable(at.params, at.measures, at.deepest, at.left) / halved;
             if (STEADY * longest..=longest).contains(&at.last) { at.last } else { longest }
         }
         TimeStepping::Realtime(longest) => longest / halved,
@@ -92,16 +92,16 @@ pub fn next(at: &Next) -> f64 {
 }
 
 /// Maximum count of halvings of a step, which keep a disturbance in a fast film within a cell. Where they cannot, the film is limited.
-pub fn most_halvings(params: &Params) -> u32 {
+pub fn max_halvings(params: &Params) -> u32 {
     if params.pace == TimeStepping::Exact { 3 } else { 0 }
 }
 
 /// Maximum transfer of a pipe of a fast film in a step, as part of the donor's depth. A disturbance travels at three times the film's speed
 /// or, where this no longer grows with depth, at that speed. It must stay within a cell a step everywhere, or it would grow.
-const FASTEST: f32 = 1.0 / 3.0;
+const MAX_FILM_TRANSFER: f32 = 1.0 / 3.0;
 
 /// Mean of phi^2, where phi is the profile of a film's velocity over its depth (`solver::lateral_friction`).
-const BESIDE: f64 = 1.2;
+const MEAN_SQUARE_PROFILE: f64 = 1.2;
 
 /// g unit dt^2 / dx^2 of a step (1 / units).
 pub fn drive(params: &Params, measures: &Measures, dt: f64) -> f64 {
@@ -109,25 +109,25 @@ pub fn drive(params: &Params, measures: &Measures, dt: f64) -> f64 {
     dt * dt * -params.gravity[1] * unit / (cell * cell)
 }
 
-/// Time (s) that a surface which counts as level would need to bring liquid from rest to [`Params::rest`].
-const LEVEL: f64 = 1.0 / 60.0;
+/// Time (s) in which a surface that just counts as level brings liquid from rest to [`Params::rest`].
+const LEVEL_TIME: f64 = 1.0 / 60.0;
 
 /// Speed (m/s) below which liquid comes to rest. With wall friction, none does: flowing liquid drags along what is beside it.
-fn rest(params: &Params) -> f64 {
+fn rest_speed(params: &Params) -> f64 {
     if params.friction == Friction::Walls { 0.0 } else { params.rest }
 }
 
 /// Maximum difference of the surfaces of adjacent cells at which liquid comes to rest (units): at least a unit, or 0 if it never does.
-fn level(params: &Params, measures: &Measures) -> i32 {
-    let fall = rest(params) * measures.cell / (LEVEL * -params.gravity[1]);
-    if rest(params) > 0.0 { (fall / measures.unit).round().clamp(1.0, 1e6) as i32 } else { 0 }
+fn rest_drop(params: &Params, measures: &Measures) -> i32 {
+    let fall = rest_speed(params) * measures.cell / (LEVEL_TIME * -params.gravity[1]);
+    if rest_speed(params) > 0.0 { (fall / measures.unit).round().clamp(1.0, 1e6) as i32 } else { 0 }
 }
 
-/// Maximum flux that counts as slow in a step of `dt` (s), over the depth in its section: a level surface never drives liquid at rest
-/// beyond it.
-fn slow(params: &Params, measures: &Measures, dt: f64) -> f64 {
-    let driven = 1.001 * drive(params, measures, dt) * f64::from(level(params, measures));
-    (rest(params) * dt / measures.cell).max(driven)
+/// Maximum flux, over the depth in its section, at which liquid comes to rest in a step of `dt` (s). A surface that counts as level never
+/// drives liquid at rest beyond it.
+fn rest_flux(params: &Params, measures: &Measures, dt: f64) -> f64 {
+    let driven = 1.001 * drive(params, measures, dt) * f64::from(rest_drop(params, measures));
+    (rest_speed(params) * dt / measures.cell).max(driven)
 }
 
 /// What gravity adds to the drop of the surface over a cell, along x and along z (units).
@@ -136,9 +136,13 @@ fn tilt(params: &Params, measures: &Measures) -> [i32; 2] {
     [x, z].map(|along| (along / -y * measures.cell / measures.unit).round().clamp(-1e9, 1e9) as i32)
 }
 
-/// The bounds of rest, the same for all steps.
-pub fn bounds(params: &Params, measures: &Measures) -> Bounds {
-    Bounds { level: level(params, measures), tilt: tilt(params, measures), still: measures.still }
+/// The bounds below which liquid rests, the same for all steps.
+pub fn rest_bounds(params: &Params, measures: &Measures) -> Bounds {
+    Bounds {
+        rest_drop: rest_drop(params, measures),
+        tilt: tilt(params, measures),
+        still_level: measures.still_level,
+    }
 }
 
 /// The coefficients that the pipes share in a step of `dt` after one of `last` (s).
@@ -155,26 +159,26 @@ pub fn step(params: &Params, measures: &Measures, dt: f64, last: f64) -> Step {
         drive: drive(params, measures, dt) as f32,
         drag: (3.0 * dt * params.liquid.viscosity / (unit * unit)).min(1e36) as f32,
         section: section as f32,
-        lighter: (f64::from(FAST_WAVES) / drive(params, measures, dt)).min(1e36) as f32,
-        fastest: FASTEST,
+        light_depth: (f64::from(FAST_WAVES) / drive(params, measures, dt)).min(1e36) as f32,
+        max_film_transfer: MAX_FILM_TRANSFER,
         is_whole: params.section == Section::Whole,
         thinning: params.liquid.thinning.map(|law| Thinning {
             shear: (3.0 * law.time * cell / (last * unit)).min(1e30) as f32,
             thinnest: (law.thinnest / params.liquid.viscosity) as f32,
             power: ((law.power - 1.0) / 2.0) as f32,
         }),
-        still: measures.still,
+        still_level: measures.still_level,
         wave: (dt / cell * (-y * unit).sqrt()) as f32,
         tilt: tilt(params, measures),
         lateral: match (params.friction, params.section) {
             (Friction::Walls, Section::Wetted) => {
-                (BESIDE * dt * params.liquid.viscosity / (cell * cell)).min(1e12) as f32
+                (MEAN_SQUARE_PROFILE * dt * params.liquid.viscosity / (cell * cell)).min(1e12) as f32
             }
             _ => 0.0,
         },
-        again: (dt / last) as f32,
+        step_ratio: (dt / last) as f32,
         cell: (cell / unit) as f32,
-        level: level(params, measures),
-        slow: slow(params, measures, dt) as f32,
+        rest_drop: rest_drop(params, measures),
+        rest_flux: rest_flux(params, measures, dt) as f32,
     }
 }

@@ -112,7 +112,7 @@ fn middle_below(liquid: &Shallow, edge: f64) -> Option<f64> {
 fn volume() -> (f64, String) {
     let ctx = context();
     let mut plan = busy([93, 61]);
-    let falls = Falls { height: 0.002, drop: 0.0, most: 500, ..Falls::default() };
+    let falls = Falls { height: 0.002, drop: 0.0, max_packets: 500, ..Falls::default() };
     plan.params.falls = Some(falls);
     let mut liquid = plan.make(&ctx, Turn::NONE);
     let mut dice = Dice(17);
@@ -131,7 +131,7 @@ fn volume() -> (f64, String) {
         steps += liquid.step(&ctx, FRAME).expect("a frame").steps;
         wrong += liquid.balance().error.unsigned_abs();
         let count = liquid.drops().len();
-        (most, flown, full) = (most.max(count), flown + count, full + u32::from(count == falls.most));
+        (most, flown, full) = (most.max(count), flown + count, full + u32::from(count == falls.max_packets));
         frame += 1;
     }
     let all = liquid.balance();
@@ -139,7 +139,7 @@ fn volume() -> (f64, String) {
         "{steps} steps, {frame} frames, {:.0} packets on average, at most {most} of {}, {full} frames full; ml inside {:.2}, in the air {:.4}, lost {:.1}, \
          held {:.4}",
         flown as f64 / f64::from(frame),
-        falls.most,
+        falls.max_packets,
         1e6 * all.inside,
         1e6 * all.falling,
         1e6 * all.lost,

@@ -89,7 +89,7 @@ impl Drawn {
 /// Mean time of a frame (ms), the median of five times sixty, and what it consists of.
 fn timed(liquid: &mut Shallow) -> (f64, String) {
     let ctx = context();
-    let most = liquid.params().falls.map_or(0, |falls| falls.most);
+    let most = liquid.params().falls.map_or(0, |falls| falls.max_packets);
     let mut drawn = Drawn::new(liquid.columns(), most);
     let (mut flows, mut draws, mut drops) = (Vec::new(), Vec::new(), 0);
     for frame in 0..BEFORE + FRAMES {

@@ -38,8 +38,17 @@ unsafe impl Plain for frz_shallow_drop {}
 
 impl From<Droplet> for frz_shallow_drop {
     fn from(drop: Droplet) -> Self {
-        let Droplet { position, velocity, volume, radius, age, source, number, concentrations, lip: _ } =
-            drop;
+        let Droplet {
+            position,
+            velocity,
+            volume,
+            radius,
+            age,
+            source,
+            number,
+            concentrations,
+            overflow_edge: _,
+        } = drop;
         Self { position, velocity, volume, radius, age, source, number, concentrations }
     }
 }
@@ -169,7 +178,7 @@ pub unsafe extern "C" fn frz_shallow_drops_bound(
     // SAFETY: the pointers are NULL or valid.
     unsafe {
         informs(size, || {
-            let most = read(shallow)?.shallow.params().falls.map_or(0, |falls| falls.most);
+            let most = read(shallow)?.shallow.params().falls.map_or(0, |falls| falls.max_packets);
             Ok(bound(most))
         })
     }

@@ -11,7 +11,7 @@ use crate::capi::grid::sparse::frz_grid;
 use crate::capi::mesh::triangles::frz_mesh;
 use crate::capi::runtime::context::{creates, frz_context};
 use crate::shallow::Report;
-use crate::shallow::time_step::MOST_STEPS;
+use crate::shallow::time_step::MAX_STEPS;
 
 /// What a frame did.
 #[repr(C)]
@@ -205,7 +205,7 @@ pub unsafe extern "C" fn frz_shallow_replay(
     unsafe {
         changes(context, shallow, report, |ctx, spill| {
             let given = steps.in_place::<f64>("steps")?;
-            within("the count of steps", given.len() as f64, 1.0..=f64::from(MOST_STEPS), "")?;
+            within("the count of steps", given.len() as f64, 1.0..=f64::from(MAX_STEPS), "")?;
             spill.steps.clear();
             spill.steps.extend(given);
             let dt = spill.steps.iter().sum();

@@ -207,7 +207,7 @@ impl frz_shallow_params {
             height: self.falls_height,
             interval: self.falls_interval,
             drop: self.falls_drop,
-            most: self.falls_most as usize,
+            max_packets: self.falls_most as usize,
         };
         let pace = match meaning("pace", "frz_shallow_pace", self.pace, &PACES)? {
             FRZ_SHALLOW_EXACT => TimeStepping::Exact,

@@ -69,7 +69,7 @@ pub unsafe extern "C" fn frz_shallow_snapshot_create(
             let mut surface = Surface::default();
             surface.reserve(snapshot.columns());
             let mut balls = Balls::default();
-            balls.reserve(spill.shallow.params().falls.map_or(0, |falls| falls.most));
+            balls.reserve(spill.shallow.params().falls.map_or(0, |falls| falls.max_packets));
             let mut taken = Taken {
                 snapshot,
                 surface,

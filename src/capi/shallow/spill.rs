@@ -64,7 +64,7 @@ impl ShallowHandle {
         let shallow = ctx.phase("columns", || Shallow::new(ctx, &setup.solids, setup.params))?;
         let mut surface = Surface::default();
         surface.reserve(shallow.columns());
-        let most = shallow.params().falls.map_or(0, |falls| falls.most);
+        let most = shallow.params().falls.map_or(0, |falls| falls.max_packets);
         let mut balls = Balls::default();
         balls.reserve(most);
         Ok(Self {

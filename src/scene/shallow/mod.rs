@@ -326,7 +326,7 @@ fn params(values: &Values) -> Params {
             height: own.get("falls_height"),
             interval: own.get("falls_interval"),
             drop: own.get::<f64>("falls_drop_ml") * ML,
-            most: own.get("falls_most"),
+            max_packets: own.get("falls_most"),
         }),
         rest: own.get("rest"),
     }

@@ -10,7 +10,7 @@ pub const TOP: i32 = 1 << 30;
 /// The bottom of a solid that has no lower end.
 pub const BOTTOMLESS: i32 = i32::MIN;
 /// Maximum number of cells along an axis.
-pub const MOST_CELLS: usize = 1 << 16;
+pub const MAX_CELLS: usize = 1 << 16;
 
 /// Square cells on the ground: x to the east, z to the south.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,8 +37,8 @@ impl Grid {
         }
         ensure(x.is_finite() && z.is_finite(), format_args!("the origin ({x}, {z}) is not finite"))?;
         ensure(
-            (1..=MOST_CELLS).contains(&nx) && (1..=MOST_CELLS).contains(&nz),
-            format_args!("{nx} x {nz} cells are not within 1 x 1 to {MOST_CELLS} x {MOST_CELLS}"),
+            (1..=MAX_CELLS).contains(&nx) && (1..=MAX_CELLS).contains(&nz),
+            format_args!("{nx} x {nz} cells are not within 1 x 1 to {MAX_CELLS} x {MAX_CELLS}"),
         )?;
         Ok(())
     }

@@ -26,7 +26,7 @@ pub struct Strip {
     pub row: u32,
     /// Position of its columns from the bottom of their cells.
     pub layer: u32,
-    /// First cell along x / 16.
+    /// Index of its block of 16 cells along x.
     pub at: u32,
 }
 
@@ -72,7 +72,7 @@ impl Clone for Columns {
         Self { grid, heights, strips, rows, north, south, present, base, ceiling, under }
     }
 
-    /// Allocates nothing where there is room.
+    /// Reuses the allocations.
     fn clone_from(&mut self, other: &Self) {
         let Self { grid, heights, strips, rows, north, south, present, base, ceiling, under } = self;
         (*grid, *heights) = (other.grid, other.heights);
@@ -156,8 +156,8 @@ impl Columns {
             self.south[before].fill(NONE);
         }
         if rows.end < self.grid.size[1] {
-            let behind = self.row(rows.end);
-            self.north[behind].fill(NONE);
+            let after = self.row(rows.end);
+            self.north[after].fill(NONE);
         }
         for row in rows.start.saturating_sub(1)..rows.end.min(self.grid.size[1] - 1) {
             let mut below = self.row(row + 1).peekable();
@@ -172,8 +172,8 @@ impl Columns {
         }
     }
 
-    /// Changes the counts of strips of some rows; the strips of later rows move. Each strip of the changed rows is then placed and set, and
-    /// the rows are connected.
+    /// Changes the counts of strips of some rows; the strips of later rows move. The caller must then place and set each strip of the
+    /// changed rows, and connect the rows.
     pub(super) fn resize_rows(&mut self, rows: Range<usize>, counts: impl Iterator<Item = u32>) {
         let old = self.rows[rows.start] as usize..self.rows[rows.end] as usize;
         let mut end = self.rows[rows.start];
@@ -369,7 +369,7 @@ pub(super) fn strip_of<T>(numbers: &[T], strip: usize) -> &[T; STRIP] {
     &numbers.as_chunks().0[strip]
 }
 
-/// As many numbers as a strip has, from any position.
+/// The 16 numbers from a position on.
 #[inline(always)]
 pub(super) fn strip_from<T>(numbers: &[T], at: usize) -> &[T; STRIP] {
     numbers[at..].first_chunk().expect("a strip")

@@ -25,9 +25,9 @@ pub enum Array {
     FluxEast,
     FluxSouth,
     /// Rounding remainders of transfers.
-    LeftEast,
-    LeftSouth,
-    /// How much less inertia counts.
+    RemainderEast,
+    RemainderSouth,
+    /// Inertia factors of fast films.
     Light,
     /// Heads of full columns.
     Head,
@@ -124,7 +124,7 @@ impl<T: Copy> Clone for PerColumn<T> {
         new
     }
 
-    /// Allocates nothing where there is room.
+    /// Reuses the allocation.
     fn clone_from(&mut self, other: &Self) {
         let Some(&any) = other.first() else { return self.list.truncate(self.before) };
         self.make_room(other.len(), any);
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn arrays_begin_at_positions_of_their_own_however_they_grow() {
+    fn arrays_keep_their_offsets_as_they_grow() {
         for array in [Array::Base, Array::FluxSouth, Array::Under] {
             let mut numbers = PerColumn::new(array, 100, 1.0_f32);
             for len in [101, 5000, 3, 100_000] {

@@ -3,18 +3,18 @@
 use std::ops::Range;
 
 use super::Falls;
-use super::flight::{Air, End};
-use super::in_air::{Falling, SPLASHES};
+use super::flight::{Air, Outcome};
+use super::in_air::{Falling, LANDINGS_PER_PACKET};
 use super::packet::Packet;
 use super::splash::{Landing, merge, spread};
 use super::waiting::{Waiting, add, outward};
 use crate::shallow::columns::{Columns, NONE};
-use crate::shallow::pipes::cliffs::beside;
+use crate::shallow::pipes::cliffs::index_beyond;
 use crate::shallow::pipes::side::Side;
 use crate::shallow::scalars::amounts::{Account, LawEffect};
 use crate::shallow::scalars::shares::{MAX_SCALARS, integer, take};
 use crate::shallow::solver::Flow;
-use crate::shallow::solver::overflow_edges::Over;
+use crate::shallow::solver::overflow_edges::Overflow;
 use crate::shallow::system::Shallow;
 
 /// Depth at the brink of a free overfall, relative to the critical depth (Rouse 1936).
@@ -30,24 +30,24 @@ impl Shallow {
     }
 
     /// Advances the falling liquid, in a step of `dt` (s) that the flow has made.
-    pub(in crate::shallow) fn fall(&mut self, dt: f64) {
+    pub(in crate::shallow) fn advance_falling(&mut self, dt: f64) {
         let Some(falls) = self.params.falls else { return };
-        self.obey_in_the_air();
+        self.apply_laws_in_air();
         self.fly(dt);
-        self.gather(dt);
+        self.collect_overflow(dt);
         self.falls.since += dt;
         // Tolerates rounding where steps add up to an interval.
         if self.falls.since >= falls.interval * (1.0 - 1e-9) {
             self.falls.since = 0.0;
             self.falls.tick += 1;
-            let Falling { threads, waiting, .. } = &mut self.falls;
-            threads.gather(&self.columns, &self.pipes.links, waiting);
-            self.let_go(&falls, 0..self.pipes.links.len(), false);
+            let Falling { rivulets, waiting, .. } = &mut self.falls;
+            rivulets.gather(&self.columns, &self.pipes.links, waiting);
+            self.release_packets(&falls, 0..self.pipes.links.len(), false);
         }
     }
 
     /// Applies the laws of scalars to liquid in the air.
-    fn obey_in_the_air(&mut self) {
+    fn apply_laws_in_air(&mut self) {
         for (scalar, effect) in self.flow.amounts.law_effects().iter().enumerate() {
             if *effect != LawEffect::default() {
                 let loads = self.falls.loads();
@@ -65,14 +65,14 @@ impl Shallow {
         packets.retain_mut(|packet| {
             let end = air.fly(packet, dt);
             match end {
-                End::Flies => {}
-                End::Lands(column) => landed.push(packet.landing(column)),
-                End::Leaves => {
+                Outcome::Flies => {}
+                Outcome::Lands(column) => landed.push(packet.landing(column)),
+                Outcome::Leaves => {
                     lost += packet.units;
                     add(&mut gone, &packet.amounts);
                 }
             }
-            end == End::Flies
+            end == Outcome::Flies
         });
         self.flow.links.lost += lost;
         self.flow.amounts.count_in(Account::Lost, &gone);
@@ -84,15 +84,15 @@ impl Shallow {
     /// no room there to adjacent columns; returns what falls from there into the void.
     fn land_all(&mut self, mut landed: Vec<Landing>) -> i64 {
         merge(&mut landed);
-        let most = self.params.falls.map_or(0, |falls| SPLASHES * falls.most);
-        spread(&self.columns, &mut landed, most);
+        let max_landings = self.params.falls.map_or(0, |falls| LANDINGS_PER_PACKET * falls.max_packets);
+        spread(&self.columns, &mut landed, max_landings);
         merge(&mut landed);
         let mut waits = false;
         for landing in landed.drain(..) {
             waits |= self.land(landing);
         }
         self.falls.landed = landed;
-        if waits { self.release() } else { 0 }
+        if waits { self.settle_held() } else { 0 }
     }
 
     fn air(&self) -> Air<'_> {
@@ -101,8 +101,8 @@ impl Shallow {
             columns: &self.columns,
             depth: &self.flow.depth,
             border: self.params.border,
-            lean: [x / grid.cell, z / grid.cell],
-            pull: -y / self.columns.heights.unit,
+            gravity_along: [x / grid.cell, z / grid.cell],
+            gravity_down: -y / self.columns.heights.unit,
         }
     }
 
@@ -119,45 +119,46 @@ impl Shallow {
     }
 
     /// Collects what went over the overflow edges in a step of `dt` (s).
-    fn gather(&mut self, dt: f64) {
+    fn collect_overflow(&mut self, dt: f64) {
         let Self { columns, pipes, flow, falls, params, .. } = self;
         let width = columns.heights.unit * columns.grid.cell / dt;
-        for over in flow.overflow_edges.over(&pipes.links, &flow.links) {
-            let is_back = over.from != pipes.links.from[over.link];
-            let side = outward(&pipes.links, over.link, is_back);
-            // Flux over section, in cells: the part of the column's depth that left in a step. Thin liquid has run out before it is as fast
-            // as that.
-            let flux = over.units as f64 / (f64::from(over.depth.max(1)) * dt);
-            // At most the speed at its depth at the brink, unless it arrived faster; for thin liquid neither is computed.
-            let (most, scale) = (-params.gravity[1] * over.units as f64 * width, BRINK * columns.grid.cell);
-            let scaled = flux * scale;
-            let speed = if scaled * scaled * scaled <= most {
-                flux
+        for overflow in flow.overflow_edges.overflow(&pipes.links, &flow.links) {
+            let is_back = overflow.from != pipes.links.from[overflow.link];
+            let side = outward(&pipes.links, overflow.link, is_back);
+            // Outflow speed (cells/s): the part of the column's depth that left, per second.
+            let speed = overflow.units as f64 / (f64::from(overflow.depth.max(1)) * dt);
+            // At most the speed at the brink for this discharge, unless the liquid arrives faster. Thin liquid is slower: for it neither is
+            // computed.
+            let (critical_cube, scale) =
+                (-params.gravity[1] * overflow.units as f64 * width, BRINK * columns.grid.cell);
+            let scaled = speed * scale;
+            let speed = if scaled * scaled * scaled <= critical_cube {
+                speed
             } else {
-                flux.min((libm::cbrt(most) / scale).max(arriving(columns, flow, &over, side)))
+                speed.min((libm::cbrt(critical_cube) / scale).max(arriving(columns, flow, &overflow, side)))
             };
-            let waiting = &mut falls.waiting[over.link];
+            let waiting = &mut falls.waiting[overflow.link];
             waiting.is_back = is_back;
-            waiting.units += over.units;
+            waiting.units += overflow.units;
             for (waiting, fallen) in waiting.amounts.iter_mut().zip(&flow.links.fallen) {
-                let fallen = fallen.get(over.link).copied().unwrap_or(0.0);
+                let fallen = fallen.get(overflow.link).copied().unwrap_or(0.0);
                 *waiting = waiting.saturating_add(integer(fallen));
             }
-            waiting.impulse += over.units as f64 * speed;
+            waiting.impulse += overflow.units as f64 * speed;
         }
     }
 
     /// Turns waiting liquid at some links into packets, if it is enough or `all` is set. If there would be too many packets, all of it
     /// lands at once, so that the result does not depend on the links' order.
-    fn let_go(&mut self, falls: &Falls, links: Range<usize>, all: bool) {
+    fn release_packets(&mut self, falls: &Falls, links: Range<usize>, all: bool) {
         let (columns, waiting) = (&self.columns, &mut self.falls.waiting);
-        let least = falls.drop / (columns.grid.cell * columns.grid.cell * columns.heights.unit);
+        let min_units = falls.drop / (columns.grid.cell * columns.grid.cell * columns.heights.unit);
         let mut count = 0;
         for waiting in waiting[links.clone()].iter_mut().filter(|waiting| waiting.units > 0) {
             waiting.waits += u32::from(!all);
-            count += usize::from(waiting.goes(least, all));
+            count += usize::from(waiting.is_due(min_units, all));
         }
-        let fits = self.falls.packets.len() + count <= falls.most;
+        let has_room = self.falls.packets.len() + count <= falls.max_packets;
         let mut packets = std::mem::take(&mut self.falls.packets);
         let mut landed = std::mem::take(&mut self.falls.landed);
         for link in links {
@@ -166,34 +167,34 @@ impl Shallow {
                 self.falls.waiting[link].before = 0;
                 continue;
             }
-            if !waiting.goes(least, all) {
+            if !waiting.is_due(min_units, all) {
                 self.falls.waiting[link].before = waiting.units;
                 continue;
             }
             self.falls.waiting[link].clear();
-            let end = if fits {
+            let end = if has_room {
                 let mut packet = self.packet(link, &waiting);
                 // It has waited, and left a little earlier: not all overflow edges release packets at the same time.
                 let ahead = if all { 0.0 } else { f64::from(waiting.phase) / f64::from(1u32 << 31) };
                 let end = self.air().fly(&mut packet, ahead * falls.interval);
-                if end == End::Flies {
+                if end == Outcome::Flies {
                     packets.push(packet);
                 }
                 end
             } else {
                 let links = &self.pipes.links;
                 match if waiting.is_back { links.from[link] } else { links.to[link] } {
-                    NONE => End::Leaves,
-                    column => End::Lands(column as usize),
+                    NONE => Outcome::Leaves,
+                    column => Outcome::Lands(column as usize),
                 }
             };
             match end {
-                End::Flies => {}
-                End::Leaves => {
+                Outcome::Flies => {}
+                Outcome::Leaves => {
                     self.flow.links.lost += waiting.units;
                     self.flow.amounts.count_in(Account::Lost, &waiting.amounts);
                 }
-                End::Lands(column) => {
+                Outcome::Lands(column) => {
                     let (column, units, amounts) = (column as u32, waiting.units, waiting.amounts);
                     landed.push(Landing { column, units, amounts });
                 }
@@ -209,7 +210,10 @@ impl Shallow {
         let from = (if waiting.is_back { links.to[link] } else { links.from[link] }) as usize;
         let side = outward(links, link, waiting.is_back);
         let own = columns.cell(from);
-        let cell = side.cell(own, columns.grid.size).expect("the border has no lips").map(|at| at as u32);
+        let cell = side
+            .cell(own, columns.grid.size)
+            .expect("overflow edges are inside the domain")
+            .map(|at| at as u32);
         let speed = waiting.impulse / waiting.units as f64;
         let (offset, along) = match side {
             Side::East => ([-0.5, 0.0], [speed, 0.0]),
@@ -217,7 +221,7 @@ impl Shallow {
             Side::South => ([0.0, -0.5], [0.0, speed]),
             Side::North => ([0.0, 0.5], [0.0, -speed]),
         };
-        let lip = (columns.grid.index(own) * 4 + side as usize) as u64;
+        let edge = (columns.grid.index(own) * 4 + side as usize) as u64;
         Packet {
             cell,
             offset,
@@ -227,17 +231,17 @@ impl Shallow {
             age: 0.0,
             units: waiting.units,
             amounts: waiting.amounts,
-            source: lip << 16 | columns.layer(from) as u64,
+            source: edge << 16 | columns.layer(from) as u64,
             tick: self.falls.tick,
         }
     }
 
     /// Turns all liquid that waits at the links of rows into packets, before the rows change.
-    pub(in crate::shallow) fn let_go_of(&mut self, rows: Range<usize>) {
+    pub(in crate::shallow) fn release_packets_of(&mut self, rows: Range<usize>) {
         if let Some(falls) = self.params.falls {
             let links = &self.pipes.links;
             let links = links.row(rows.start).start..links.row(rows.end - 1).end;
-            self.let_go(&falls, links, true);
+            self.release_packets(&falls, links, true);
         }
     }
 
@@ -265,9 +269,9 @@ impl Packet {
 }
 
 /// The speed (cells/s) at which liquid arrives at an overflow edge from the column behind it, through a regular pipe; 0 if none does.
-fn arriving(columns: &Columns, flow: &Flow, over: &Over, side: Side) -> f64 {
-    let from = over.from as usize;
-    let Some(behind) = beside(columns, from, side.opposite()) else { return 0.0 };
+fn arriving(columns: &Columns, flow: &Flow, overflow: &Overflow, side: Side) -> f64 {
+    let from = overflow.from as usize;
+    let Some(behind) = index_beyond(columns, from, side.opposite()) else { return 0.0 };
     let [east, south] = &flow.flux;
     let flux = match side {
         Side::East => east[behind],

@@ -15,13 +15,13 @@ pub(super) struct Air<'a> {
     pub depth: &'a [i32],
     pub border: Border,
     /// Gravity: along x and z (cells/s2), and downward (units/s2).
-    pub lean: [f64; 2],
-    pub pull: f64,
+    pub gravity_along: [f64; 2],
+    pub gravity_down: f64,
 }
 
-/// How a flight ends.
+/// The outcome of a part of a flight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum End {
+pub(super) enum Outcome {
     /// It continues.
     Flies,
     /// It lands on a column.
@@ -32,7 +32,7 @@ pub(super) enum End {
 
 /// What is at a height in a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Place {
+enum Location {
     /// The space of a column, wet or not.
     In(usize),
     /// The solid below a column.
@@ -43,44 +43,44 @@ enum Place {
 
 impl Air<'_> {
     /// Moves a packet for `dt` (s), or until its flight ends.
-    pub fn fly(&self, packet: &mut Packet, dt: f64) -> End {
+    pub fn fly(&self, packet: &mut Packet, dt: f64) -> Outcome {
         let mut left = dt;
         let mut stopped = [false; 2];
         packet.age += dt;
         loop {
-            let (floor, end) = match self.position(packet.cell, packet.height) {
-                Place::Solid(above) => return End::Lands(above),
-                Place::In(column) => (self.surface(column), End::Lands(column)),
-                Place::Void => (0.0, End::Leaves),
+            let (floor, end) = match self.locate(packet.cell, packet.height) {
+                Location::Solid(above) => return Outcome::Lands(above),
+                Location::In(column) => (self.surface(column), Outcome::Lands(column)),
+                Location::Void => (0.0, Outcome::Leaves),
             };
             if packet.height <= floor {
                 return end;
             }
             let exits =
-                [0, 1].map(|axis| if stopped[axis] { f64::INFINITY } else { self.exit(packet, axis) });
+                [0, 1].map(|axis| if stopped[axis] { f64::INFINITY } else { self.exit_time(packet, axis) });
             let first = exits[0].min(exits[1]);
             let time = first.min(left);
-            if self.down(packet, packet.height - floor) <= time {
+            if self.fall_time(packet, packet.height - floor) <= time {
                 return end;
             }
             self.advance(packet, time, stopped);
             left -= time;
             if first > time {
-                return if packet.height <= floor { end } else { End::Flies };
+                return if packet.height <= floor { end } else { Outcome::Flies };
             }
             let crossed = exits.map(|exit| exit == first);
             match self.cross(packet, crossed) {
                 Crossed::Stopped(axes) => (0..2).for_each(|axis| stopped[axis] |= axes[axis]),
                 Crossed::Into(cell) => packet.cell = cell,
-                Crossed::Out => return End::Leaves,
+                Crossed::Out => return Outcome::Leaves,
             }
         }
     }
 
     /// The column above the solid that a packet is in; None if it is not in a solid.
     pub fn above_solid(&self, packet: &Packet) -> Option<usize> {
-        match self.position(packet.cell, packet.height) {
-            Place::Solid(above) => Some(above),
+        match self.locate(packet.cell, packet.height) {
+            Location::Solid(above) => Some(above),
             _ => None,
         }
     }
@@ -89,42 +89,42 @@ impl Air<'_> {
         f64::from(self.columns.bases()[column] + self.depth[column])
     }
 
-    fn position(&self, cell: [u32; 2], height: f64) -> Place {
-        let mut position = Place::Void;
+    fn locate(&self, cell: [u32; 2], height: f64) -> Location {
+        let mut location = Location::Void;
         for column in self.columns.of_cell(cell.map(|at| at as usize)) {
             if height < f64::from(self.columns.bases()[column]) {
                 let is_below = height < f64::from(self.columns.unders()[column]);
                 // It is not below the ceiling of the column before.
-                return if is_below { Place::Void } else { Place::Solid(column) };
+                return if is_below { Location::Void } else { Location::Solid(column) };
             }
-            position = Place::In(column);
+            location = Location::In(column);
             if height < f64::from(self.columns.ceilings()[column]) {
                 break;
             }
         }
-        position
+        location
     }
 
     /// The time (s) until a packet leaves its cell along an axis.
-    fn exit(&self, packet: &Packet, axis: usize) -> f64 {
-        let (at, speed, pull) = (packet.offset[axis], packet.along[axis], self.lean[axis]);
-        reach(0.5 - at, speed, pull).min(reach(0.5 + at, -speed, -pull))
+    fn exit_time(&self, packet: &Packet, axis: usize) -> f64 {
+        let (at, speed, pull) = (packet.offset[axis], packet.along[axis], self.gravity_along[axis]);
+        travel_time(0.5 - at, speed, pull).min(travel_time(0.5 + at, -speed, -pull))
     }
 
     /// The time (s) until a packet is `drop` lower (units).
-    fn down(&self, packet: &Packet, drop: f64) -> f64 {
+    fn fall_time(&self, packet: &Packet, drop: f64) -> f64 {
         let speed = packet.down;
-        2.0 * drop / (speed + (speed * speed + 2.0 * self.pull * drop).sqrt())
+        2.0 * drop / (speed + (speed * speed + 2.0 * self.gravity_down * drop).sqrt())
     }
 
     fn advance(&self, packet: &mut Packet, time: f64, stopped: [bool; 2]) {
         for axis in (0..2).filter(|&axis| !stopped[axis]) {
-            let (speed, pull) = (packet.along[axis], self.lean[axis]);
+            let (speed, pull) = (packet.along[axis], self.gravity_along[axis]);
             packet.offset[axis] = (packet.offset[axis] + (speed + 0.5 * pull * time) * time).clamp(-0.5, 0.5);
             packet.along[axis] = speed + pull * time;
         }
-        packet.height -= (packet.down + 0.5 * self.pull * time) * time;
-        packet.down += self.pull * time;
+        packet.height -= (packet.down + 0.5 * self.gravity_down * time) * time;
+        packet.down += self.gravity_down * time;
     }
 
     /// Takes a packet over the sides of its cell that it has reached. At a wall it stops, and falls down along it.
@@ -146,7 +146,7 @@ impl Air<'_> {
                 return Crossed::Out;
             }
             is_out
-        } else if matches!(self.position(cell, packet.height), Place::Solid(_)) {
+        } else if matches!(self.locate(cell, packet.height), Location::Solid(_)) {
             crossed
         } else {
             packet.offset = offset;
@@ -168,7 +168,7 @@ enum Crossed {
 }
 
 /// The time (s) in which a body with a speed and an acceleration moves a distance of 0 or more outward; infinite if it never does.
-fn reach(distance: f64, speed: f64, pull: f64) -> f64 {
+fn travel_time(distance: f64, speed: f64, pull: f64) -> f64 {
     let square = speed * speed + 2.0 * pull * distance;
     if speed > 0.0 && square >= 0.0 {
         2.0 * distance / (speed + square.sqrt())
@@ -210,9 +210,9 @@ mod tests {
         (cell, height): ([u32; 2], f64),
         [east, down, south]: [f64; 3],
         dt: f64,
-    ) -> (End, Packet) {
+    ) -> (Outcome, Packet) {
         let depth = vec![0; columns.len()];
-        let air = Air { columns, depth: &depth, border, lean: [0.0; 2], pull: 9.81 * METRE };
+        let air = Air { columns, depth: &depth, border, gravity_along: [0.0; 2], gravity_down: 9.81 * METRE };
         let mut packet = Packet {
             cell,
             offset: [0.0; 2],
@@ -227,21 +227,21 @@ mod tests {
         };
         for _ in 0..10_000 {
             match air.fly(&mut packet, dt) {
-                End::Flies => {}
+                Outcome::Flies => {}
                 end => return (end, packet),
             }
         }
-        (End::Flies, packet)
+        (Outcome::Flies, packet)
     }
 
     #[test]
-    fn ten_metres_a_second_pass_no_layer() {
+    fn fast_packets_pass_through_no_layer() {
         // A sheet of 10 um over the ground, hit slantwise, in steps of 30 cm.
         let sheet = columns([600, 4], |_| vec![[-1.0, 0.1], [0.5, 0.500_01]]);
         for velocity in [[0.0, 10.0, 0.0], [5.0, 10.0, 0.0], [10.0, 0.1, 0.0], [8.0, 6.0, 0.002]] {
             for height in [0.501, 0.65, 0.7] {
                 let (end, packet) = end(&sheet, Border::Closed, ([10, 1], height), velocity, 0.03);
-                let End::Lands(column) = end else { panic!("{end:?} {packet:?}") };
+                let Outcome::Lands(column) = end else { panic!("{end:?} {packet:?}") };
                 assert_eq!(sheet.layer(column), 1, "{velocity:?} from {height} m");
             }
         }
@@ -249,14 +249,17 @@ mod tests {
         let wall = columns([600, 4], |[x, _]| vec![[-1.0, if x == 300 { 3.0 } else { 0.1 }]]);
         for (cell, east) in [([10, 1], 10.0), ([590, 2], -10.0)] {
             let (end, packet) = end(&wall, Border::Closed, (cell, 2.0), [east, 0.0, 0.0], 0.03);
-            let End::Lands(column) = end else { panic!("{end:?}") };
+            let Outcome::Lands(column) = end else { panic!("{end:?}") };
             let [x, _] = wall.cell(column);
             assert_eq!((x, packet.along[0]), (if east > 0.0 { 299 } else { 301 }, 0.0));
         }
         // Along both axes at once, through the corner of four cells.
         let corner = columns([40, 40], |[x, z]| vec![[-1.0, if x + z >= 40 { 3.0 } else { 0.1 }]]);
         let (end, packet) = end(&corner, Border::Closed, ([10, 10], 2.0), [10.0, 0.0, 10.0], 0.03);
-        assert!(matches!(end, End::Lands(column) if corner.cell(column) == [19, 19]), "{end:?} {packet:?}");
+        assert!(
+            matches!(end, Outcome::Lands(column) if corner.cell(column) == [19, 19]),
+            "{end:?} {packet:?}"
+        );
     }
 
     #[test]
@@ -266,24 +269,24 @@ mod tests {
             for dt in [1e-3, 0.0137, 0.2, 3.0] {
                 let (end, _) = end(&ground, Border::Closed, ([0, 0], height), [east, 0.0, 0.0], dt);
                 let reach = east * (2.0 * (height - 0.1) / 9.81_f64).sqrt() + 0.5 * CELL;
-                let End::Lands(column) = end else { panic!("{end:?}") };
+                let Outcome::Lands(column) = end else { panic!("{end:?}") };
                 assert_eq!(ground.cell(column)[0], (reach / CELL) as usize, "{height} {east} {dt}");
             }
         }
     }
 
     #[test]
-    fn nowhere_is_outside_and_a_wall_is_not() {
+    fn packets_leave_through_the_void_and_open_borders_and_stop_at_walls() {
         let void = columns([30, 3], |[x, _]| if x > 10 { vec![] } else { vec![[0.5, 0.6]] });
         let at = ([12, 1], 0.6);
-        assert_eq!(end(&void, Border::Closed, at, [0.01, 0.0, 0.0], 0.01).0, End::Leaves, "below");
+        assert_eq!(end(&void, Border::Closed, at, [0.01, 0.0, 0.0], 0.01).0, Outcome::Leaves, "below");
         let (over, packet) = end(&void, Border::Open, at, [1.0, 0.0, 0.0], 0.01);
-        assert!(over == End::Leaves && packet.age < 0.03, "over the border: {packet:?}");
+        assert!(over == Outcome::Leaves && packet.age < 0.03, "over the border: {packet:?}");
         let (below, packet) = end(&void, Border::Closed, at, [1.0, 0.0, 0.0], 0.01);
-        assert!(below == End::Leaves && packet.age > 0.3 && packet.cell[0] == 29, "{packet:?}");
+        assert!(below == Outcome::Leaves && packet.age > 0.3 && packet.cell[0] == 29, "{packet:?}");
         // From the void below a slab it does not rise through the slab.
         let back = end(&void, Border::Closed, ([12, 1], 0.55), [-1.0, 0.0, 0.0], 0.01);
-        assert!(back.0 == End::Leaves && back.1.cell[0] == 11 && back.1.along[0] == 0.0, "{back:?}");
+        assert!(back.0 == Outcome::Leaves && back.1.cell[0] == 11 && back.1.along[0] == 0.0, "{back:?}");
     }
 
     #[test]
@@ -291,13 +294,13 @@ mod tests {
         for (distance, speed, pull) in
             [(0.3, 2.0, 0.0), (0.3, 2.0, 5.0), (0.3, -2.0, 5.0), (0.3, 2.0, -5.0), (0.9, 0.0, 3.0)]
         {
-            let time = reach(distance, speed, pull);
+            let time = travel_time(distance, speed, pull);
             let gone = speed * time + 0.5 * pull * time * time;
             assert!((gone - distance).abs() < 1e-12, "{distance} {speed} {pull}: {gone} after {time} s");
             assert!(speed + pull * time > 0.0, "outward");
         }
-        assert_eq!(reach(0.3, 1.0, -5.0), f64::INFINITY);
-        assert_eq!(reach(0.3, -1.0, 0.0), f64::INFINITY);
-        assert_eq!((reach(0.0, 1.0, -5.0), reach(0.0, 0.0, 1.0)), (0.0, 0.0));
+        assert_eq!(travel_time(0.3, 1.0, -5.0), f64::INFINITY);
+        assert_eq!(travel_time(0.3, -1.0, 0.0), f64::INFINITY);
+        assert_eq!((travel_time(0.0, 1.0, -5.0), travel_time(0.0, 0.0, 1.0)), (0.0, 0.0));
     }
 }

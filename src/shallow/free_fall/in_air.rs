@@ -12,7 +12,7 @@ use crate::numeric::lists::refill;
 use crate::shallow::scalars::shares::MAX_SCALARS;
 
 /// Capacity of the list of landings: this many columns for each packet.
-pub(super) const SPLASHES: usize = 4;
+pub(super) const LANDINGS_PER_PACKET: usize = 4;
 
 /// All liquid in the air.
 #[derive(Debug, Clone, Default)]
@@ -23,7 +23,7 @@ pub(in crate::shallow) struct Falling {
     pub waiting: Vec<Waiting>,
     /// Landings of a step; kept to avoid repeated allocation.
     pub(super) landed: Vec<Landing>,
-    pub(super) threads: Rivulets,
+    pub(super) rivulets: Rivulets,
     /// Seconds since packets were last created, and how many times they were.
     pub since: f64,
     pub tick: u64,
@@ -34,19 +34,19 @@ impl Falling {
     pub fn new(falls: Option<&Falls>, links: usize) -> Self {
         let Some(falls) = falls else { return Self::default() };
         Self {
-            packets: Vec::with_capacity(falls.most),
+            packets: Vec::with_capacity(falls.max_packets),
             waiting: vec![Waiting::default(); links],
-            landed: Vec::with_capacity(SPLASHES * falls.most),
-            threads: Rivulets::with_room(links),
+            landed: Vec::with_capacity(LANDINGS_PER_PACKET * falls.max_packets),
+            rivulets: Rivulets::with_room(links),
             ..Self::default()
         }
     }
 
     /// Memory (bytes).
     pub fn bytes(&self) -> usize {
-        self.packets.capacity() * (size_of::<Packet>() + SPLASHES * size_of::<Landing>())
+        self.packets.capacity() * (size_of::<Packet>() + LANDINGS_PER_PACKET * size_of::<Landing>())
             + size_of_val(&self.waiting[..])
-            + self.threads.bytes()
+            + self.rivulets.bytes()
     }
 
     /// Replaces the packets, and what waits at each link.

@@ -18,9 +18,9 @@ const BALL: [usize; 2] = [42, 80];
 const SIDES: usize = 6;
 const RINGS: usize = 3;
 /// Circumradius of a hexagon with the area of a unit circle: sqrt(pi / (1.5 sqrt 3)).
-const AROUND: f64 = 1.099_636;
+const CIRCUMRADIUS: f64 = 1.099_636;
 /// Length, in radii, from which on a strand between two drops gets thinner; it breaks at twice that.
-const LONGEST: f64 = 9.02;
+const THINNING_LENGTH: f64 = 9.02;
 /// How much wider it is at its overflow edge, where it is as thick as the film.
 const FLARE: f64 = 1.6;
 
@@ -59,8 +59,8 @@ struct Strand {
     next: Option<u32>,
     /// Radius (m) of its liquid's section.
     radius: f64,
-    /// The part that has not drained into its drops yet, 0 to 1.
-    whole: f64,
+    /// The part of its liquid that has not drained into the drops yet, 0 to 1.
+    undrained: f64,
 }
 
 /// Builds meshes of drops; its buffers are reused.
@@ -76,7 +76,7 @@ pub struct Balls {
     strands: Vec<Strand>,
     /// Radius of each drop (m).
     radii: Vec<f64>,
-    /// For each drop: the sums of its strands' radii (m) and of their `whole`, and their count.
+    /// For each drop: the sums of its strands' radii (m) and of their `undrained`, and their count.
     sums: Vec<[f64; 3]>,
 }
 
@@ -124,18 +124,18 @@ impl Balls {
             });
             let Some(strand) = Strand::new(drops, at, next) else { continue };
             for end in [Some(at), next].into_iter().flatten() {
-                let [radius, whole, count] = &mut self.sums[end as usize];
+                let [radius, undrained, count] = &mut self.sums[end as usize];
                 *radius += strand.radius;
-                *whole += strand.whole;
+                *undrained += strand.undrained;
                 *count += 1.0;
             }
             self.strands.push(strand);
         }
         refill(
             &mut self.radii,
-            drops.iter().zip(&self.sums).map(|(drop, &[radius, whole, count])| {
+            drops.iter().zip(&self.sums).map(|(drop, &[radius, undrained, count])| {
                 // In drops that are close together, the strand is no thicker than the drop.
-                let part = if count > 0.0 { whole / count } else { 0.0 };
+                let part = if count > 0.0 { undrained / count } else { 0.0 };
                 let strand = if count > 0.0 { (radius / count).min(drop.radius) } else { 0.0 };
                 drop.radius + part * (strand - drop.radius)
             }),
@@ -154,27 +154,29 @@ impl Balls {
         target.check(&counts)?;
         let (axes, scale) = (Axes::of(layout), layout.scale);
         let shape: [[f32; 3]; BALL[0]] =
-            std::array::from_fn(|at| axes.turn(self.vertices[at]).map(|number| number as f32));
-        let turned = |vector: DVec3| axes.turn(vector).map(|number| (number * scale) as f32);
+            std::array::from_fn(|at| axes.convert(self.vertices[at]).map(|number| number as f32));
+        let turned = |vector: DVec3| axes.convert(vector).map(|number| (number * scale) as f32);
         if let Some(to) = &mut target.positions {
-            let (balls, strands) = parts(to, drops.len());
+            let (balls, strands) = split_strands(to, drops.len());
             for (to, (drop, radius)) in balls.zip(drops.iter().zip(&self.radii)) {
                 let (centre, radius) = (turned(drop.position.into()), (radius * self.size * scale) as f32);
                 for (to, normal) in to.iter_mut().zip(&shape) {
                     *to = [0, 1, 2].map(|n| centre[n] + radius * normal[n]);
                 }
             }
-            self.each_corner(drops, strands, |_, position, _| turned(position));
+            self.write_strands(drops, strands, |_, position, _| turned(position));
         }
         if let Some(to) = &mut target.normals {
-            let (balls, strands) = parts(to, drops.len());
+            let (balls, strands) = split_strands(to, drops.len());
             balls.for_each(|to| to.copy_from_slice(&shape));
-            self.each_corner(drops, strands, |normal, _, _| axes.turn(normal).map(|number| number as f32));
+            self.write_strands(drops, strands, |normal, _, _| {
+                axes.convert(normal).map(|number| number as f32)
+            });
         }
         if let Some(to) = &mut target.velocities {
-            let (balls, strands) = parts(to, drops.len());
+            let (balls, strands) = split_strands(to, drops.len());
             balls.zip(drops).for_each(|(to, drop)| to.fill(turned(drop.velocity.into())));
-            self.each_corner(drops, strands, |_, _, drop| turned(drop.velocity.into()));
+            self.write_strands(drops, strands, |_, _, drop| turned(drop.velocity.into()));
         }
         if let Some(to) = &mut target.drops {
             let (balls, strands) = to.split_at_mut(BALL[0] * drops.len());
@@ -194,7 +196,7 @@ impl Balls {
     }
 
     /// Writes a vector for each vertex of the strands, from its normal, its position (m) and its drop.
-    fn each_corner(
+    fn write_strands(
         &self,
         drops: &[Droplet],
         to: &mut [f32],
@@ -204,23 +206,28 @@ impl Balls {
         for strand in &self.strands {
             let first = &drops[strand.drop as usize];
             let own = self.radii[strand.drop as usize];
-            let (last, position, edge, axes) = match (strand.next.map(|next| next as usize), first.lip) {
-                (Some(next), _) => (&drops[next], drops[next].position, None, [self.radii[next]; 2]),
-                (None, Some(lip)) => {
-                    (first, lip.position, Some(lip.edge), [FLARE * own, own.min(0.5 * lip.depth)])
-                }
-                (None, None) => (first, first.position, None, [own; 2]),
-            };
+            let (last, position, edge, axes) =
+                match (strand.next.map(|next| next as usize), first.overflow_edge) {
+                    (Some(next), _) => (&drops[next], drops[next].position, None, [self.radii[next]; 2]),
+                    (None, Some(overflow)) => (
+                        first,
+                        overflow.position,
+                        Some(overflow.edge),
+                        [FLARE * own, own.min(0.5 * overflow.depth)],
+                    ),
+                    (None, None) => (first, first.position, None, [own; 2]),
+                };
             let [start, end] = [first.position, position].map(DVec3::from);
-            let way = end - start;
-            let [aside, across] = edge.map_or_else(|| beside(way), |edge| beside_with(way, edge.into()));
-            // The middle lacks what has drained into the drops.
-            let middle = [0, 1].map(|n| 0.5 * (own + axes[n]) * strand.whole);
-            let halfway = start + 0.5 * way;
+            let axis = end - start;
+            let [aside, across] =
+                edge.map_or_else(|| perpendiculars(axis), |edge| perpendiculars_near(axis, edge.into()));
+            // Only what has not drained into the drops is left in the middle.
+            let middle = [0, 1].map(|n| 0.5 * (own + axes[n]) * strand.undrained);
+            let halfway = start + 0.5 * axis;
             for (drop, position, axes) in
                 [(first, start, [own; 2]), (first, halfway, middle), (last, end, axes)]
             {
-                let axes = axes.map(|radius| radius * AROUND);
+                let axes = axes.map(|radius| radius * CIRCUMRADIUS);
                 for ([cos, sin], to) in HEXAGON.into_iter().zip(&mut to) {
                     let off = axes[0] * cos * aside + axes[1] * sin * across;
                     *to = vector(cos * aside + sin * across, position + off, drop);
@@ -261,15 +268,15 @@ impl Strand {
         let drop = &drops[at as usize];
         let (position, volume) = match next.map(|next| &drops[next as usize]) {
             Some(next) => (next.position, 0.5 * (drop.volume + next.volume)),
-            None => (drop.lip?.position, drop.volume),
+            None => (drop.overflow_edge?.position, drop.volume),
         };
-        let long = (DVec3::from(position) - DVec3::from(drop.position)).norm();
-        if long <= 0.0 {
+        let length = (DVec3::from(position) - DVec3::from(drop.position)).norm();
+        if length <= 0.0 {
             return None;
         }
-        let radius = (volume / (std::f64::consts::PI * long)).sqrt().min(drop.radius);
-        let whole = (2.0 - long / (LONGEST * radius)).clamp(0.0, 1.0);
-        (whole > 0.0).then_some(Self { drop: at, next, radius, whole })
+        let radius = (volume / (std::f64::consts::PI * length)).sqrt().min(drop.radius);
+        let undrained = (2.0 - length / (THINNING_LENGTH * radius)).clamp(0.0, 1.0);
+        (undrained > 0.0).then_some(Self { drop: at, next, radius, undrained })
     }
 }
 
@@ -284,8 +291,8 @@ impl Target<'_> {
     }
 }
 
-/// The vectors of each ball, and those of the strands.
-fn parts(to: &mut [f32], drops: usize) -> (std::slice::ChunksExactMut<'_, [f32; 3]>, &mut [f32]) {
+/// Splits vectors into those of each ball and those of the strands.
+fn split_strands(to: &mut [f32], drops: usize) -> (std::slice::ChunksExactMut<'_, [f32; 3]>, &mut [f32]) {
     let (balls, strands) = to.split_at_mut(3 * BALL[0] * drops);
     (balls.as_chunks_mut().0.chunks_exact_mut(BALL[0]), strands)
 }
@@ -302,7 +309,7 @@ impl Axes {
         Self { z_up, sign: if layout.left_handed != z_up { -1.0 } else { 1.0 } }
     }
 
-    fn turn(&self, vector: DVec3) -> [f64; 3] {
+    fn convert(&self, vector: DVec3) -> [f64; 3] {
         let [x, y, z] = vector.into();
         if self.z_up { [x, self.sign * z, y] } else { [x, y, self.sign * z] }
     }
@@ -315,13 +322,13 @@ const HEXAGON: [[f64; 2]; SIDES] = {
 };
 
 /// Two unit vectors perpendicular to a direction; right-handed, with the direction last.
-fn beside(direction: DVec3) -> [DVec3; 2] {
+fn perpendiculars(direction: DVec3) -> [DVec3; 2] {
     let is_steep = direction.x.abs() < 0.7 * direction.norm();
-    beside_with(direction, if is_steep { DVec3::x() } else { DVec3::z() })
+    perpendiculars_near(direction, if is_steep { DVec3::x() } else { DVec3::z() })
 }
 
-/// As [`beside`]; the first is close to another direction.
-fn beside_with(direction: DVec3, other: DVec3) -> [DVec3; 2] {
+/// As [`perpendiculars`]; the first is close to another direction.
+fn perpendiculars_near(direction: DVec3, other: DVec3) -> [DVec3; 2] {
     let direction = direction.normalize();
     let across = direction.cross(&other).normalize();
     [across.cross(&direction), across]

@@ -28,8 +28,8 @@ use super::scalars::MAX_SCALARS;
 use super::scalars::shares::LEVELS;
 use super::system::Shallow;
 pub(super) use crate::shallow::free_fall::in_air::Falling;
-pub(super) use crate::shallow::free_fall::waiting::{LIP, Waiting};
-pub(super) use packet::{PACKET, Packet};
+pub(super) use crate::shallow::free_fall::waiting::{WAITING_BYTES, Waiting};
+pub(super) use packet::{PACKET_BYTES, Packet};
 pub use params::Falls;
 
 /// Liquid in the air, as a host sees it.
@@ -50,7 +50,7 @@ pub struct Droplet {
     /// Concentration of each scalar, in the scalar's own measure.
     pub concentrations: [f32; MAX_SCALARS],
     /// Where the liquid leaves the ground; only for the newest drop there.
-    pub lip: Option<OverflowEdge>,
+    pub overflow_edge: Option<OverflowEdge>,
     /// One more than the number of the previous drop of the same overflow edge, unless the flow there was interrupted.
     pub number: u64,
 }
@@ -67,7 +67,7 @@ pub struct OverflowEdge {
 }
 
 impl Shallow {
-    /// The liquid in the air, in the order in which it left the overflow edges; at most [`Falls::most`].
+    /// The liquid in the air, in the order in which it left the overflow edges; at most [`Falls::max_packets`].
     pub fn drops(&self) -> impl ExactSizeIterator<Item = Droplet> + '_ {
         let (grid, heights) = (self.columns.grid, self.columns.heights);
         let unit = grid.cell * grid.cell * heights.unit;
@@ -77,28 +77,29 @@ impl Shallow {
             for ((out, scalar), amount) in concentrations.iter_mut().zip(scalars).zip(packet.amounts) {
                 *out = (amount as f64 / packet.units as f64 * (scalar.range / LEVELS)) as f32;
             }
-            let place = |axis: usize| {
+            let coordinate = |axis: usize| {
                 grid.origin[axis] + (f64::from(packet.cell[axis]) + 0.5 + packet.offset[axis]) * grid.cell
             };
             let [east, south] = packet.along.map(|speed| speed * grid.cell);
             let volume = packet.units as f64 * unit;
-            let lip = (packet.tick == self.falls.tick).then(|| self.lip_of(packet)).flatten();
+            let overflow_edge =
+                (packet.tick == self.falls.tick).then(|| self.overflow_edge_of(packet)).flatten();
             Droplet {
-                position: [place(0), heights.low + packet.height * heights.unit, place(1)],
+                position: [coordinate(0), heights.low + packet.height * heights.unit, coordinate(1)],
                 velocity: [east, -packet.down * heights.unit, south],
                 volume,
                 radius: libm::cbrt(0.75 / std::f64::consts::PI * volume),
                 age: packet.age,
                 source: packet.source,
                 concentrations,
-                lip,
+                overflow_edge,
                 number: packet.tick,
             }
         })
     }
 
     /// Where a packet's liquid comes from; None if the ground has moved since.
-    fn lip_of(&self, packet: &Packet) -> Option<OverflowEdge> {
+    fn overflow_edge_of(&self, packet: &Packet) -> Option<OverflowEdge> {
         let (columns, unit) = (&self.columns, self.columns.heights.unit);
         let (cell, layer) = ((packet.source >> 18) as usize, (packet.source & 0xffff) as usize);
         let cell = [cell % columns.grid.size[0], cell / columns.grid.size[0]];

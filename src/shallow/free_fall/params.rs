@@ -18,12 +18,12 @@ pub struct Falls {
     pub drop: f64,
     /// Maximum count of packets in the air, 1 to 1,048,576; their memory is reserved from the beginning. Default: 8192. At the maximum,
     /// liquid that goes over an overflow edge arrives below at once.
-    pub most: usize,
+    pub max_packets: usize,
 }
 
 impl Default for Falls {
     fn default() -> Self {
-        Self { height: 0.01, interval: 1.0 / 120.0, drop: 6.5e-11, most: 8192 }
+        Self { height: 0.01, interval: 1.0 / 120.0, drop: 6.5e-11, max_packets: 8192 }
     }
 }
 
@@ -36,8 +36,11 @@ impl Falls {
         check_not_negative("falls.height", self.height)?;
         check_not_negative("falls.drop", self.drop)?;
         check_within("falls.interval", self.interval, " s", 1e-4..=1.0)?;
-        if !(1..=1 << 20).contains(&self.most) {
-            return Err(Error::argument(format!("falls.most = {} is not within 1 to 1048576", self.most)));
+        if !(1..=1 << 20).contains(&self.max_packets) {
+            return Err(Error::argument(format!(
+                "falls.most = {} is not within 1 to 1048576",
+                self.max_packets
+            )));
         }
         Ok(())
     }

@@ -15,11 +15,11 @@ use crate::shallow::pipes::side::Side;
 /// mm for water.
 const REACH: f64 = 0.004;
 /// Sentinel: not merged into another rivulet.
-const OWN: u32 = u32::MAX;
+const UNMERGED: u32 = u32::MAX;
 
 /// An overflow edge at which liquid waits.
 #[derive(Debug, Clone, Copy)]
-struct OverflowEdge {
+struct ActiveEdge {
     /// Index of the cell that it belongs to (`Grid::index`).
     cell: u32,
     link: u32,
@@ -31,14 +31,14 @@ struct OverflowEdge {
     strength: i64,
     /// Index in this list of the edge that takes its liquid, and the distance to it (square of half cells).
     into: u32,
-    away: i32,
+    square_distance: i32,
 }
 
 /// Lists of overflow edges; kept to avoid repeated allocation.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rivulets {
     /// By cell.
-    lips: Vec<OverflowEdge>,
+    edges: Vec<ActiveEdge>,
     /// By decreasing strength.
     order: Vec<u32>,
 }
@@ -46,54 +46,54 @@ pub(super) struct Rivulets {
 impl Rivulets {
     /// Empty, with capacity for so many links.
     pub fn with_room(links: usize) -> Self {
-        Self { lips: Vec::with_capacity(links), order: Vec::with_capacity(links) }
+        Self { edges: Vec::with_capacity(links), order: Vec::with_capacity(links) }
     }
 
     /// Memory (bytes).
     pub fn bytes(&self) -> usize {
-        self.lips.capacity() * size_of::<OverflowEdge>() + self.order.capacity() * size_of::<u32>()
+        self.edges.capacity() * size_of::<ActiveEdge>() + self.order.capacity() * size_of::<u32>()
     }
 
-    /// Finds which overflow edges are rivulets, and which of these takes the liquid of each other edge.
+    /// Finds the rivulets among the overflow edges, and for each other edge the rivulet that takes its liquid.
     fn find(&mut self, columns: &Columns, links: &Links, waiting: &[Waiting]) {
         let grid = columns.grid;
         let reach = 2.0 * REACH / grid.cell;
         // The next edge along a straight side is a cell (two halves) away; around a corner it is closer.
         let (reach, cells) = ((reach * reach).min(1e6) as i32, (0.5 * reach).min(500.0) as usize + 1);
-        self.lips.clear();
+        self.edges.clear();
         for (link, own) in waiting.iter().enumerate().filter(|(_, own)| own.is_awake()) {
             let from = (if own.is_back { links.to[link] } else { links.from[link] }) as usize;
             let side = if own.is_back { links.sides[link].opposite() } else { links.sides[link] };
             let [x, z] = columns.cell(from);
             let [east, south] = side.outward();
-            let came = own.units - own.before;
-            self.lips.push(OverflowEdge {
+            let inflow = own.units - own.before;
+            self.edges.push(ActiveEdge {
                 cell: grid.index([x, z]) as u32,
                 link: link as u32,
                 middle: [2 * x as i32 + east, 2 * z as i32 + south],
                 base: columns.bases()[from],
                 side,
-                strength: if came > 0 { own.steady + came } else { 0 },
-                into: OWN,
-                away: i32::MAX,
+                strength: if inflow > 0 { own.steady + inflow } else { 0 },
+                into: UNMERGED,
+                square_distance: i32::MAX,
             });
         }
-        self.lips.sort_unstable_by_key(|lip| (lip.cell, lip.link));
-        refill(&mut self.order, 0..self.lips.len() as u32);
-        let lips = &self.lips;
-        self.order.sort_unstable_by_key(|&at| std::cmp::Reverse(lips[at as usize].strength));
+        self.edges.sort_unstable_by_key(|edge| (edge.cell, edge.link));
+        refill(&mut self.order, 0..self.edges.len() as u32);
+        let edges = &self.edges;
+        self.order.sort_unstable_by_key(|&at| std::cmp::Reverse(edges[at as usize].strength));
         let step = (grid.cell / columns.heights.unit).min(f64::from(i32::MAX / 2)) as i32;
         let mut first = 0;
         while first < self.order.len() {
             // Edges of equal strength do not take from each other.
-            let strength = self.lips[self.order[first] as usize].strength;
+            let strength = self.edges[self.order[first] as usize].strength;
             let same =
-                self.order[first..].iter().take_while(|&&at| self.lips[at as usize].strength == strength);
+                self.order[first..].iter().take_while(|&&at| self.edges[at as usize].strength == strength);
             let end = first + same.count();
             if strength > 0 {
                 for position in first..end {
                     let at = self.order[position];
-                    if self.lips[at as usize].into == OWN {
+                    if self.edges[at as usize].into == UNMERGED {
                         self.take_around(at, [reach, step], cells, grid.size);
                     }
                 }
@@ -104,69 +104,67 @@ impl Rivulets {
 
     /// A rivulet takes weaker edges nearby, unless a stronger one does; of two equally strong rivulets, the nearer one does.
     fn take_around(&mut self, at: u32, [reach, step]: [i32; 2], cells: usize, [nx, nz]: [usize; 2]) {
-        let own = self.lips[at as usize];
+        let own = self.edges[at as usize];
         let [x, z] = [own.cell as usize % nx, own.cell as usize / nx];
         for row in z.saturating_sub(cells)..(z + cells + 1).min(nz) {
             let [from, to] =
                 [x.saturating_sub(cells), (x + cells).min(nx - 1)].map(|x| (row * nx + x) as u32);
-            let first = self.lips.partition_point(|lip| lip.cell < from);
-            for other in first..self.lips.len() {
-                let lip = self.lips[other];
-                if lip.cell > to {
+            let first = self.edges.partition_point(|edge| edge.cell < from);
+            for other in first..self.edges.len() {
+                let edge = self.edges[other];
+                if edge.cell > to {
                     break;
                 }
-                let [east, south] = [0, 1].map(|n| lip.middle[n] - own.middle[n]);
-                let away = east * east + south * south;
-                let joins = away <= reach
-                    && lip.strength < own.strength
-                    && lip.side != own.side.opposite()
-                    && (lip.base - own.base).abs() <= step;
+                let [east, south] = [0, 1].map(|n| edge.middle[n] - own.middle[n]);
+                let square_distance = east * east + south * south;
+                let joins = square_distance <= reach
+                    && edge.strength < own.strength
+                    && edge.side != own.side.opposite()
+                    && (edge.base - own.base).abs() <= step;
                 if !joins {
                     continue;
                 }
-                let (is_free, taken) = (lip.into == OWN && lip.away == i32::MAX, lip.into);
+                let (is_free, taken) = (edge.into == UNMERGED && edge.square_distance == i32::MAX, edge.into);
                 let is_equal =
-                    !is_free && (taken == OWN || self.lips[taken as usize].strength == own.strength);
-                let lip = &mut self.lips[other];
-                if is_free || is_equal && away < lip.away {
-                    (lip.into, lip.away) = (at, away);
-                } else if is_equal && away == lip.away {
+                    !is_free && (taken == UNMERGED || self.edges[taken as usize].strength == own.strength);
+                let edge = &mut self.edges[other];
+                if is_free || is_equal && square_distance < edge.square_distance {
+                    (edge.into, edge.square_distance) = (at, square_distance);
+                } else if is_equal && square_distance == edge.square_distance {
                     // Equally far from two equal rivulets: neither takes it.
-                    lip.into = OWN;
+                    edge.into = UNMERGED;
                 }
             }
         }
     }
-}
 
-impl Rivulets {
     /// Gives what waits at overflow edges to the rivulets near them, and updates the inflow of each in this interval.
     pub fn gather(&mut self, columns: &Columns, links: &Links, waiting: &mut [Waiting]) {
         self.find(columns, links, waiting);
-        for lip in self.lips.iter().filter(|lip| lip.into != OWN) {
-            let given = &mut waiting[lip.link as usize];
+        for edge in self.edges.iter().filter(|edge| edge.into != UNMERGED) {
+            let given = &mut waiting[edge.link as usize];
             let Waiting { units, amounts, impulse, .. } = *given;
             given.clear();
-            let taker = &mut waiting[self.lips[lip.into as usize].link as usize];
+            let taker = &mut waiting[self.edges[edge.into as usize].link as usize];
             taker.units += units;
             add(&mut taker.amounts, &amounts);
             taker.gathered += impulse.round() as i64;
         }
-        for lip in &self.lips {
-            let own = &mut waiting[lip.link as usize];
+        for edge in &self.edges {
+            let own = &mut waiting[edge.link as usize];
             // A sum of integers, so that it does not depend on an order.
             own.impulse += own.gathered as f64;
             own.gathered = 0;
-            let came = (own.units - own.before).max(0);
-            if came > 2 * own.steady {
-                own.phase = (scatter(came as u64) >> 33) as u32;
+            let inflow = (own.units - own.before).max(0);
+            if inflow > 2 * own.steady {
+                own.phase = (scatter(inflow as u64) >> 33) as u32;
             }
-            own.steady = (3 * own.steady + came) / 4;
+            own.steady = (3 * own.steady + inflow) / 4;
         }
     }
 }
 
-/// Hashes close numbers to ones scattered over the whole range (splitmix64, Steele et al. 2014).
+/// Hashes numbers that are close together to ones scattered over the whole range (splitmix64, Steele et al. 2014).
 fn scatter(number: u64) -> u64 {
     let mixed = number.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let mixed = (mixed ^ mixed >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -10,7 +10,7 @@ use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::scalars::shares::part;
 
 /// Maximum radius of the spread (cells).
-const FURTHEST: i32 = 3;
+const MAX_SPREAD: i32 = 3;
 
 /// Liquid that lands on a column: units and amounts.
 #[derive(Debug, Clone, Copy)]
@@ -33,22 +33,22 @@ pub(super) fn merge(landed: &mut Vec<Landing>) {
     });
 }
 
-/// Gives equal parts to the surrounding columns, if the list then has at most `most` entries; otherwise does nothing.
-pub(super) fn spread(columns: &Columns, landed: &mut Vec<Landing>, most: usize) {
+/// Gives equal parts to the surrounding columns, if the list then has at most `max_landings` entries; otherwise does nothing.
+pub(super) fn spread(columns: &Columns, landed: &mut Vec<Landing>, max_landings: usize) {
     let mut count = 0;
     for landing in &*landed {
-        around(columns, landing, |_| count += 1);
+        for_each_spread(columns, landing, |_| count += 1);
     }
-    if landed.len() + count > most {
+    if landed.len() + count > max_landings {
         return;
     }
     for at in 0..landed.len() {
         let landing = landed[at];
         let mut count = 1;
-        around(columns, &landing, |_| count += 1);
+        for_each_spread(columns, &landing, |_| count += 1);
         let units = landing.units / count;
         let amounts = part(&landing.amounts, units, landing.units);
-        around(columns, &landing, |column| {
+        for_each_spread(columns, &landing, |column| {
             let own = &mut landed[at];
             own.units -= units;
             own.amounts.iter_mut().zip(amounts).for_each(|(own, part)| *own -= part);
@@ -58,19 +58,19 @@ pub(super) fn spread(columns: &Columns, landed: &mut Vec<Landing>, most: usize) 
 }
 
 /// The columns that a landing spreads to.
-fn around(columns: &Columns, landing: &Landing, mut with: impl FnMut(u32)) {
+fn for_each_spread(columns: &Columns, landing: &Landing, mut with: impl FnMut(u32)) {
     let (own, grid) = (landing.column as usize, columns.grid);
     let depth = landing.units as f64 * columns.heights.unit / grid.cell;
     // Squared diameter (cells) of a ball of its volume.
     let radius = libm::cbrt(0.75 / std::f64::consts::PI * depth);
-    let square = (4.0 * radius * radius).min(f64::from(FURTHEST * FURTHEST)) as i32;
+    let square = (4.0 * radius * radius).min(f64::from(MAX_SPREAD * MAX_SPREAD)) as i32;
     if square < 1 {
         return;
     }
     let ([x, z], base) = (columns.cell(own), columns.bases()[own]);
     let step = grid.cell / columns.heights.unit;
-    for south in -FURTHEST..=FURTHEST {
-        for east in -FURTHEST..=FURTHEST {
+    for south in -MAX_SPREAD..=MAX_SPREAD {
+        for east in -MAX_SPREAD..=MAX_SPREAD {
             let away = east * east + south * south;
             if away == 0 || away > square {
                 continue;
@@ -80,9 +80,9 @@ fn around(columns: &Columns, landing: &Landing, mut with: impl FnMut(u32)) {
                 continue;
             }
             // At most one column a cell, no further up or down than a slope of 45 degrees.
-            let most = step * f64::from(away).sqrt();
+            let max_rise = step * f64::from(away).sqrt();
             let joins = |&column: &usize| {
-                f64::from((columns.bases()[column] - base).abs()) <= most && columns.overlap(own, column)
+                f64::from((columns.bases()[column] - base).abs()) <= max_rise && columns.overlap(own, column)
             };
             if let Some(column) = columns.of_cell(cell).find(joins) {
                 with(column as u32);

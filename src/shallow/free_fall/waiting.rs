@@ -6,7 +6,7 @@ use crate::shallow::pipes::side::Side;
 use crate::shallow::scalars::shares::MAX_SCALARS;
 
 /// Bytes of an overflow edge in a saved state.
-pub(in crate::shallow) const LIP: usize = 40;
+pub(in crate::shallow) const WAITING_BYTES: usize = 40;
 
 /// Intervals after which liquid of less than a drop is released anyway.
 const PATIENCE: u32 = 60;
@@ -37,9 +37,9 @@ pub(in crate::shallow) struct Waiting {
 
 impl Waiting {
     /// Its serialised form, for a saved state.
-    pub fn to_bytes(self) -> [u8; LIP] {
+    pub fn to_bytes(self) -> [u8; WAITING_BYTES] {
         let last = u64::from(self.waits) | u64::from(self.is_back) << 32 | u64::from(self.phase) << 33;
-        let mut bytes = [0; LIP];
+        let mut bytes = [0; WAITING_BYTES];
         let numbers =
             [self.units as u64, self.impulse.to_bits(), last, self.steady as u64, self.before as u64];
         bytes.as_chunks_mut().0.iter_mut().zip(numbers).for_each(|(to, number)| *to = number.to_le_bytes());
@@ -47,7 +47,7 @@ impl Waiting {
     }
 
     /// Reads what [`Waiting::to_bytes`] wrote; amounts are 0.
-    pub fn from_bytes(bytes: &[u8; LIP]) -> Self {
+    pub fn from_bytes(bytes: &[u8; WAITING_BYTES]) -> Self {
         let [units, impulse, last, steady, before] =
             std::array::from_fn(|at| u64::from_le_bytes(bytes.as_chunks().0[at]));
         Self {
@@ -64,7 +64,7 @@ impl Waiting {
     }
 
     /// Whether it is valid for a link.
-    pub fn is_of(&self, columns: &Columns, links: &Links, link: usize) -> bool {
+    pub fn is_valid_in(&self, columns: &Columns, links: &Links, link: usize) -> bool {
         let is_void = links.to[link] == NONE;
         let is_lip = !is_void
             || !self.is_back
@@ -78,12 +78,11 @@ impl Waiting {
             && steady.contains(&self.before)
             && (!self.is_awake() || is_lip)
     }
-}
 
-impl Waiting {
-    pub fn goes(&self, least: f64, all: bool) -> bool {
-        let most = self.units.max(DRIPS * self.steady);
-        all || most as f64 >= least || self.waits >= PATIENCE
+    /// Whether it becomes a packet: it fills a drop of `min_units`, pours, or has waited long enough; or `all` is set.
+    pub fn is_due(&self, min_units: f64, all: bool) -> bool {
+        let expected = self.units.max(DRIPS * self.steady);
+        all || expected as f64 >= min_units || self.waits >= PATIENCE
     }
 
     /// Whether liquid waits there, or arrived recently.

@@ -43,14 +43,14 @@ impl Cliffs {
         for position in 0..STRIP {
             let i = strip * STRIP + position;
             let is_cliff = |j: usize| columns.is_column(i) && columns.is_column(j) && self.has(columns, i, j);
-            bits |= u16::from(beside(columns, i, side).is_some_and(is_cliff)) << position;
+            bits |= u16::from(index_beyond(columns, i, side).is_some_and(is_cliff)) << position;
         }
         bits
     }
 }
 
 /// The index of the same layer beyond a side.
-pub(in crate::shallow) fn beside(columns: &Columns, i: usize, side: Side) -> Option<usize> {
+pub(in crate::shallow) fn index_beyond(columns: &Columns, i: usize, side: Side) -> Option<usize> {
     let (strip, position) = (i / STRIP, i % STRIP);
     let at = |strip: u32| (strip != NONE).then(|| strip as usize * STRIP + position);
     match side {

@@ -13,7 +13,7 @@ pub struct Links {
     pub from: Vec<u32>,
     /// The other column, or [`NONE`]: the outside.
     pub to: Vec<u32>,
-    /// The side of the first column that each link crosses.
+    /// The side of `from` that each link crosses.
     pub(in crate::shallow) sides: Vec<Side>,
     /// As [`Pipes::east`](super::Pipes::east).
     pub open: Vec<f32>,
@@ -26,7 +26,7 @@ pub struct Links {
     /// First of those columns of each row, and the end of the last.
     pub column_rows: Vec<u32>,
     /// Maximum count of pipes of a column.
-    pub most: usize,
+    pub max_pipes: usize,
 }
 
 impl Links {
@@ -63,10 +63,10 @@ impl Links {
             let rank = ends.rank(end);
             ends.counts[rank] += 1;
         }
-        self.most = 4 + ends.counts.iter().copied().max().unwrap_or(0) as usize;
+        self.max_pipes = 4 + ends.counts.iter().copied().max().unwrap_or(0) as usize;
     }
 
-    /// Replaces the links of some rows. Column indices in the rows behind grow by `shift`, modulo 2^32.
+    /// Replaces the links of some rows. Column indices in later rows grow by `shift`, modulo 2^32.
     pub(in crate::shallow) fn replace_rows(&mut self, rows: Range<usize>, new: &Self, shift: u32) {
         let old = self.rows[rows.start] as usize..self.rows[rows.end] as usize;
         self.from.splice(old.clone(), new.from.iter().copied());
@@ -108,13 +108,13 @@ impl Links {
         self.from.is_empty()
     }
 
-    /// The outside surface (units) of a link that leads there, and whether it is that of the liquid at rest beyond the border, `still`.
+    /// The surface (units) outside at a link that leads there, and whether it is that of the liquid at rest, `still_level`.
     #[inline]
-    pub fn outside(&self, columns: &Columns, link: usize, still: i32) -> (i32, bool) {
+    pub fn outside(&self, columns: &Columns, link: usize, still_level: i32) -> (i32, bool) {
         let from = self.from[link] as usize;
-        let is_still = still > columns.bases()[from]
+        let is_still = still_level > columns.bases()[from]
             && self.sides[link].cell(columns.cell(from), columns.grid.size).is_none();
-        if is_still { (still, true) } else { (self.level[link], false) }
+        if is_still { (still_level, true) } else { (self.level[link], false) }
     }
 
     /// The links that a row owns: from its columns to others of the row, to the next row, or to the outside.

@@ -6,7 +6,7 @@
 
 mod border;
 pub(super) mod cliffs;
-pub(super) mod joints;
+pub(super) mod finder;
 pub(super) mod links;
 pub(super) mod pipe_rules;
 pub(super) mod side;
@@ -18,7 +18,7 @@ pub use links::Links;
 
 use super::columns::Columns;
 use super::columns::per_column::{Array, PerColumn};
-use joints::Finder;
+use finder::Finder;
 use pipe_rules::Rules;
 
 /// All pipes of a terrain.
@@ -39,7 +39,7 @@ impl Pipes {
     }
 
     /// As [`Pipes::new`], but with these rules: pipes over cliffs are links, and where the ground beside a column rises steeply it is a
-    /// wall (`Rules::steepest`).
+    /// wall (`Rules::wall_rise`).
     pub(super) fn with_rules(columns: &Columns, rules: Rules) -> Self {
         let mut pipes = Self {
             east: PerColumn::new(Array::OpenEast, columns.len(), 0.0),
@@ -80,7 +80,7 @@ mod tests {
     const METRE: i32 = 1 << 20;
 
     #[test]
-    fn a_slope_closes_by_its_square_and_one_the_same_from_both_sides() {
+    fn openness_falls_with_the_square_of_the_slope_and_is_the_same_from_both_sides() {
         let ground = |[x, z]: [usize; 2]| vec![[BOTTOMLESS, (100 + x as i32 + 3 * z as i32) * METRE / 4]];
         let columns = columns([20, 20], ground);
         let pipes = Pipes::new(&columns, Border::Closed);
@@ -95,14 +95,14 @@ mod tests {
 
     #[test]
     fn a_bank_is_a_wall_where_friction_is_at_walls_and_a_steep_plane_stays_a_slope() {
-        let rules = |steepest| Rules { steepest, ..Rules::bordered(Border::Closed) };
+        let rules = |wall_rise| Rules { wall_rise, ..Rules::bordered(Border::Closed) };
         // A channel along x, with banks of three metres beside three cells of one metre.
         let channel = columns([4, 5], |[_, z]| {
             vec![[BOTTOMLESS, if z == 0 || z == 4 { 103 * METRE } else { 100 * METRE }]]
         });
         let beside = channel.column([1, 1], 0).unwrap();
         let [walled, open] =
-            [METRE, i32::MAX].map(|most| Pipes::with_rules(&channel, rules(most)).east[beside]);
+            [METRE, i32::MAX].map(|rise| Pipes::with_rules(&channel, rules(rise)).east[beside]);
         assert_eq!((walled, open), (1.0, (1.0f32 + 2.25).powi(-2)));
         // A plane of 56 degrees across the pipe.
         let plane = columns([4, 5], |[_, z]| vec![[BOTTOMLESS, 100 * METRE + 3 * z as i32 * METRE / 2]]);
@@ -135,7 +135,7 @@ mod tests {
         assert_eq!(pipes.links.len(), 10);
         assert_eq!(pipes.links.row(0).len(), 5);
         assert_eq!(pipes.links.columns_of(1).len(), 5, "those of the bridge");
-        assert_eq!(pipes.links.most, 6);
+        assert_eq!(pipes.links.max_pipes, 6);
     }
 
     #[test]

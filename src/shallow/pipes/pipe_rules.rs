@@ -13,8 +13,8 @@ pub(in crate::shallow) struct Rules {
     pub border: Border,
     pub cliffs: Cliffs,
     /// A rise of more than this over a cell (units), on only one side of a column, is a wall and not a slope.
-    pub steepest: i32,
-    pub apart: Option<ExcludedCells>,
+    pub wall_rise: i32,
+    pub excluded: Option<ExcludedCells>,
 }
 
 /// Cells that belong to another liquid. Where they have no columns, they are a wall and not a void.
@@ -35,17 +35,17 @@ impl ExcludedCells {
 
 impl Rules {
     /// The rules for a liquid.
-    pub fn of(params: &Params, columns: &Columns, apart: Option<&ExcludedCells>) -> Self {
-        let steepest = match params.friction {
+    pub fn of(params: &Params, columns: &Columns, excluded: Option<&ExcludedCells>) -> Self {
+        let wall_rise = match params.friction {
             Friction::Ground => i32::MAX,
             Friction::Walls => (columns.grid.cell / columns.heights.unit).min(f64::from(i32::MAX)) as i32,
         };
         let cliffs = Falls::cliffs(params.falls.as_ref(), columns);
-        Self { border: params.border, cliffs, steepest, apart: apart.cloned() }
+        Self { border: params.border, cliffs, wall_rise, excluded: excluded.cloned() }
     }
 
     /// Rules with neither cliffs nor walls.
     pub fn bordered(border: Border) -> Self {
-        Self { border, cliffs: Cliffs::NONE, steepest: i32::MAX, apart: None }
+        Self { border, cliffs: Cliffs::NONE, wall_rise: i32::MAX, excluded: None }
     }
 }

@@ -7,8 +7,8 @@
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_mut, strip_of};
 
-/// Slopes are clamped to this (60 degrees): a step of the ground is not a slope, and liquid falls over its edge.
-const STEEPEST: f64 = 3.0;
+/// Maximum square of a slope (60 degrees); steeper ones are clamped: a step of the ground is not a slope, and liquid falls over its edge.
+const MAX_SQUARE: f64 = 3.0;
 
 /// A quantity of the columns of a strip.
 type Lanes = [i32; STRIP];
@@ -27,16 +27,16 @@ pub(super) struct Rises {
 }
 
 impl Rises {
-    /// Finds the rises of a row; a rise of more than `steepest` units on only one side is a wall.
-    pub fn find(&mut self, columns: &Columns, row: usize, steepest: i32) {
+    /// Finds the rises of a row; a rise of more than `wall_rise` units on only one side is a wall.
+    pub fn find(&mut self, columns: &Columns, row: usize, wall_rise: i32) {
         let len = (columns.row(row).len() + 1) * STRIP;
         self.x.resize(len, 0);
         self.z.resize(len, 0);
         let rises = self;
-        if steepest == i32::MAX {
-            dispatch!(at most avx2: rise::<false>(columns: &Columns, row: usize, rises: &mut Rises, steepest: i32));
+        if wall_rise == i32::MAX {
+            dispatch!(at most avx2: rise::<false>(columns: &Columns, row: usize, rises: &mut Rises, wall_rise: i32));
         } else {
-            dispatch!(at most avx2: rise::<true>(columns: &Columns, row: usize, rises: &mut Rises, steepest: i32));
+            dispatch!(at most avx2: rise::<true>(columns: &Columns, row: usize, rises: &mut Rises, wall_rise: i32));
         }
     }
 }
@@ -52,7 +52,7 @@ pub(super) fn scale(columns: &Columns) -> f64 {
 pub(super) fn openness(along: f64, across: f64, scale: f64) -> f32 {
     let (along, across) = (along * scale, across * scale);
     let square = along * along + across * across;
-    let steep = 1.0 + if square < STEEPEST { square } else { STEEPEST };
+    let steep = 1.0 + if square < MAX_SQUARE { square } else { MAX_SQUARE };
     (1.0 / (steep * steep)) as f32
 }
 
@@ -81,39 +81,40 @@ fn window(numbers: &[i32], strip: usize, [west, east]: [bool; 2]) -> [i32; STRIP
     window
 }
 
+/// The numbers of a neighbouring strip; 0 if there is none.
 #[inline(always)]
 fn beyond(numbers: &[i32], strip: u32) -> &Lanes {
     if strip == NONE { &ABSENT } else { strip_of(numbers, strip as usize) }
 }
 
-/// All bits set where liquid can pass between columns with these bases and ceilings. An absent column has its ceiling at the lowest base.
+/// All bits set where liquid can pass between columns with these bases and ceilings. An absent column has both at 0: nothing passes.
 #[inline(always)]
 fn passes(base: [i32; 2], ceiling: [i32; 2]) -> i32 {
     -i32::from(base[0].max(base[1]) < ceiling[0].min(ceiling[1]))
 }
 
-/// Twice the rise, from the rises over both sides and masks of those that exist. Where liquid passes, bases are within 0 to 2^30 - 1: it
-/// fits.
+/// Twice the rise, from the rises over both sides and masks of those that exist. Where liquid passes, bases are within 0 to 2^30 - 1, and
+/// their sum fits.
 #[inline(always)]
 fn twice([before, behind]: [i32; 2], [has_before, has_behind]: [i32; 2]) -> i32 {
     (behind | (before & !has_behind)) + (before | (behind & !has_before))
 }
 
-/// All bits set for the sides that are walls: the ground there rises or falls by over `steepest`, and does not continue so on the other
+/// All bits set for the sides that are walls: the ground there rises or falls by over `wall_rise`, and does not continue so on the other
 /// side.
 #[inline(always)]
-fn walls([before, behind]: [i32; 2], steepest: i32) -> [i32; 2] {
-    let is_steep = [before, behind].map(|step| -i32::from(step.abs() > steepest));
+fn walls([before, behind]: [i32; 2], wall_rise: i32) -> [i32; 2] {
+    let is_steep = [before, behind].map(|step| -i32::from(step.abs() > wall_rise));
     let goes_on = is_steep[0] & is_steep[1] & !((before ^ behind) >> 31);
     is_steep.map(|steep| steep & !goes_on)
 }
 
 /// Twice the rise over open sides, from the steps over both and masks of those that are open.
 #[inline(always)]
-fn rise_of<const WALLED: bool>(steps: [i32; 2], open: [i32; 2], steepest: i32) -> i32 {
+fn rise_of<const WALLED: bool>(steps: [i32; 2], open: [i32; 2], wall_rise: i32) -> i32 {
     let steps = [steps[0] & open[0], steps[1] & open[1]];
     if WALLED {
-        let walls = walls(steps, steepest);
+        let walls = walls(steps, wall_rise);
         let open = [open[0] & !walls[0], open[1] & !walls[1]];
         twice([steps[0] & open[0], steps[1] & open[1]], open)
     } else {
@@ -122,7 +123,7 @@ fn rise_of<const WALLED: bool>(steps: [i32; 2], open: [i32; 2], steepest: i32) -
 }
 
 #[inline(always)]
-fn rise<const WALLED: bool>(columns: &Columns, row: usize, rises: &mut Rises, steepest: i32) {
+fn rise<const WALLED: bool>(columns: &Columns, row: usize, rises: &mut Rises, wall_rise: i32) {
     let (bases, ceilings) = (columns.bases(), columns.ceilings());
     for (position, strip) in columns.row(row).enumerate() {
         let beside = [columns.west(strip).is_some(), columns.east(strip).is_some()];
@@ -133,7 +134,7 @@ fn rise<const WALLED: bool>(columns: &Columns, row: usize, rises: &mut Rises, st
             let open_west = passes([base[x], base[x + 1]], [ceiling[x], ceiling[x + 1]]);
             let open_east = passes([base[x + 1], base[x + 2]], [ceiling[x + 1], ceiling[x + 2]]);
             let steps = [base[x + 1].wrapping_sub(base[x]), base[x + 2].wrapping_sub(base[x + 1])];
-            along[x] = rise_of::<WALLED>(steps, [open_west, open_east], steepest);
+            along[x] = rise_of::<WALLED>(steps, [open_west, open_east], wall_rise);
         }
         let (base, ceiling) = (strip_of(bases, strip), strip_of(ceilings, strip));
         let (north, south) = (columns.north(strip), columns.south(strip));
@@ -144,7 +145,7 @@ fn rise<const WALLED: bool>(columns: &Columns, row: usize, rises: &mut Rises, st
             let open_north = passes([north_base[x], base[x]], [north_ceiling[x], ceiling[x]]);
             let open_south = passes([base[x], south_base[x]], [ceiling[x], south_ceiling[x]]);
             let steps = [base[x].wrapping_sub(north_base[x]), south_base[x].wrapping_sub(base[x])];
-            across[x] = rise_of::<WALLED>(steps, [open_north, open_south], steepest);
+            across[x] = rise_of::<WALLED>(steps, [open_north, open_south], wall_rise);
         }
     }
 }

@@ -40,7 +40,7 @@ impl Snapshot {
             columns,
             depth: vec![0; len],
             velocity: vec![[0.0; 2]; len],
-            drops: Vec::with_capacity(shallow.params.falls.map_or(0, |falls| falls.most)),
+            drops: Vec::with_capacity(shallow.params.falls.map_or(0, |falls| falls.max_packets)),
             concentrations: Default::default(),
             time: 0.0,
         };

@@ -12,7 +12,7 @@ use crate::shallow::solver::Flow;
 pub(super) struct Band {
     /// The rows.
     pub rows: Range<usize>,
-    /// Number of their first strip among all.
+    /// Index of their first strip among all rows.
     pub first: usize,
     pub strips: Vec<Strip>,
     /// First strip of each row, and the end of the last.
@@ -24,9 +24,9 @@ pub(super) struct Band {
     pub depth: Vec<i32>,
     /// Flux to the east and to the south, and the remainders of transfers.
     pub flux: [Vec<f32>; 2],
-    pub left: [Vec<f32>; 2],
+    pub remainder: [Vec<f32>; 2],
     /// Heads above the surface.
-    pub over: Vec<f32>,
+    pub excess_heads: Vec<f32>,
     /// Amounts of scalars; empty without them.
     pub amounts: [Vec<f64>; MAX_SCALARS],
 }
@@ -47,9 +47,9 @@ impl Band {
         flow.depths()[indices.clone()].clone_into(&mut self.depth);
         for axis in [0, 1] {
             flow.flux[axis][indices.clone()].clone_into(&mut self.flux[axis]);
-            flow.left[axis][indices.clone()].clone_into(&mut self.left[axis]);
+            flow.remainder[axis][indices.clone()].clone_into(&mut self.remainder[axis]);
         }
-        flow.network.over()[indices.clone()].clone_into(&mut self.over);
+        flow.network.excess_heads()[indices.clone()].clone_into(&mut self.excess_heads);
         for (own, amounts) in self.amounts.iter_mut().zip(&flow.amounts.amounts) {
             amounts.get(indices.clone()).unwrap_or_default().clone_into(own);
         }

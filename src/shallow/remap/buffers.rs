@@ -7,7 +7,7 @@ use super::held::Held;
 use super::layout::Layout;
 use super::origins::Origins;
 use crate::shallow::columns::stacks::Stacks;
-use crate::shallow::pipes::joints::Finder;
+use crate::shallow::pipes::finder::Finder;
 use crate::shallow::pipes::links::{Ends, Links};
 use crate::shallow::terrain::ground::Ground;
 

@@ -26,13 +26,13 @@ struct OldLink {
 /// Buffers.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Carry {
-    /// The former links of some rows; the start of each row's, and the end of the last.
+    /// The former links of some rows; the first of each row, and the end of the last.
     old: Vec<OldLink>,
     starts: Vec<u32>,
     rows: Range<usize>,
-    /// Of the present links of these rows.
+    /// Fluxes and remainders of the new links of these rows.
     pub flux: Vec<f32>,
-    pub left: Vec<f32>,
+    pub remainder: Vec<f32>,
 }
 
 /// The columns before and after the change.
@@ -54,7 +54,7 @@ impl Carry {
                 from: links.from[link],
                 to: links.to[link],
                 side: links.sides[link],
-                carried: [flow.links.flux[link], flow.links.left[link]],
+                carried: [flow.links.flux[link], flow.links.remainder[link]],
             }));
             self.starts.push(self.old.len() as u32);
         }
@@ -62,7 +62,7 @@ impl Carry {
     }
 
     /// Whether the links of these rows still join the same columns.
-    pub fn is_same(&self, links: &Links) -> bool {
+    pub fn has_same_links(&self, links: &Links) -> bool {
         let ends = links.from.iter().zip(&links.to);
         links.len() == self.old.len()
             && ends.zip(&self.old).all(|((from, to), old)| (*from, *to) == (old.from, old.to))
@@ -71,12 +71,12 @@ impl Carry {
     /// Finds the fluxes and remainders of the new links of these rows.
     pub fn links(&mut self, change: &Change, flow: &Flow, links: &Links) {
         self.flux.clear();
-        self.left.clear();
+        self.remainder.clear();
         for link in 0..links.len() {
             let (from, to, side) = (links.from[link], links.to[link], links.sides[link]);
-            let [flux, left] = self.of(change, flow, [from, to], side);
+            let [flux, remainder] = self.of(change, flow, [from, to], side);
             self.flux.push(flux);
-            self.left.push(left);
+            self.remainder.push(remainder);
         }
     }
 
@@ -142,8 +142,8 @@ impl Carry {
         let mut before = [[0.0; STRIP]; 2];
         if kept != 0 {
             before = match old {
-                Some(old) => [&change.band.flux, &change.band.left].map(|of| *strip_of(&of[axis], old)),
-                None => [&flow.flux, &flow.left].map(|of| *strip_of(&of[axis], strip)),
+                Some(old) => [&change.band.flux, &change.band.remainder].map(|of| *strip_of(&of[axis], old)),
+                None => [&flow.flux, &flow.remainder].map(|of| *strip_of(&of[axis], strip)),
             };
         }
         for (number, before) in before.iter_mut().enumerate() {
@@ -153,10 +153,10 @@ impl Carry {
             if kept != u16::MAX {
                 (0..STRIP).filter(|x| kept >> x & 1 == 0).for_each(|x| before[x] = 0.0);
             }
-            let now = if number == 0 { &mut flow.flux } else { &mut flow.left };
+            let now = if number == 0 { &mut flow.flux } else { &mut flow.remainder };
             *strip_mut(&mut now[axis], strip) = *before;
         }
-        if change.origins.odd.is_empty() {
+        if change.origins.relayered.is_empty() {
             return;
         }
         for x in (0..STRIP).filter(|x| kept >> x & 1 == 0 && open[*x] > 0.0) {
@@ -165,31 +165,31 @@ impl Carry {
                 Side::South => change.columns.south(strip) * STRIP as u32 + x as u32,
                 _ => from + 1,
             };
-            let [flux, left] = self.of(change, flow, [from, to], side);
+            let [flux, remainder] = self.of(change, flow, [from, to], side);
             flow.flux[axis][from as usize] = flux;
-            flow.left[axis][from as usize] = left;
+            flow.remainder[axis][from as usize] = remainder;
         }
     }
 
     /// Restores the heads of the band's columns.
     pub fn heads(change: &Change, flow: &mut Flow) {
         let Change { columns, band, origins } = change;
-        let over = flow.network.over_mut();
+        let heads = flow.network.excess_heads_mut();
         for row in band.rows.clone() {
             for strip in columns.row(row) {
                 let (old, kept) = origins.strip(strip);
-                let now = strip_mut(over, strip);
+                let now = strip_mut(heads, strip);
                 now.fill(0.0);
                 if kept != 0 {
-                    let before = strip_of(&band.over, old - band.first);
+                    let before = strip_of(&band.excess_heads, old - band.first);
                     for x in 0..STRIP {
                         now[x] = if kept >> x & 1 == 1 { before[x] } else { 0.0 };
                     }
                 }
             }
         }
-        for [index, old] in &origins.odd {
-            over[*index as usize] = band.over[*old as usize];
+        for [index, old] in &origins.relayered {
+            heads[*index as usize] = band.excess_heads[*old as usize];
         }
     }
 }
@@ -206,15 +206,15 @@ impl Change<'_> {
         self.columns.strips()[(strip as u32).wrapping_add(shift) as usize]
     }
 
-    /// The former flux and remainder of the regular pipe of an old index over a side. Pipes behind the band stay regular.
+    /// The former flux and remainder of the regular pipe of an old index over a side. Pipes after the band stay regular.
     fn regular(&self, flow: &Flow, index: u32, side: Side) -> Carried {
         let axis = usize::from(side == Side::South);
         let (strip, range) = (index as usize / STRIP, self.band.range());
         if range.contains(&strip) {
             let at = index as usize - range.start * STRIP;
-            [self.band.flux[axis][at], self.band.left[axis][at]]
+            [self.band.flux[axis][at], self.band.remainder[axis][at]]
         } else {
-            [flow.flux[axis][index as usize], flow.left[axis][index as usize]]
+            [flow.flux[axis][index as usize], flow.remainder[axis][index as usize]]
         }
     }
 }

@@ -5,12 +5,11 @@
 //! no room above goes down.
 
 use crate::numeric::lists::refill;
+use crate::shallow::columns::NONE;
 use crate::shallow::columns::grid::BOTTOMLESS;
 use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::scalars::shares::take;
 
-/// No column.
-const NO: u32 = u32::MAX;
 /// Layers for which capacity is reserved from the start.
 const LAYERS: usize = 16;
 
@@ -31,7 +30,7 @@ pub(super) struct New {
     pub ceiling: i32,
     /// Depth of the liquid that it receives.
     pub depth: i32,
-    /// Index of the column that it was before, or `u32::MAX`.
+    /// Index of the column that it was before, or [`NONE`].
     pub from: u32,
     /// Amounts of scalars that it receives.
     pub amounts: [i64; MAX_SCALARS],
@@ -55,7 +54,7 @@ pub(super) struct Cell {
     pub new: Vec<New>,
     /// Underside of the lowest solid after the change.
     pub under: i32,
-    /// If there are several columns, bases further apart than this are not of the same column.
+    /// If there are several columns, one whose base moves further than this (units) counts as another one.
     pub reach: i64,
     parcels: Vec<Parcel>,
     costs: Vec<i64>,
@@ -63,7 +62,7 @@ pub(super) struct Cell {
 
 /// Liquid that finds no column in its cell.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Rest {
+pub(super) struct Leftover {
     pub units: i64,
     /// The lowest height at which it stood.
     pub height: i32,
@@ -88,22 +87,22 @@ impl Default for Cell {
 
 impl Cell {
     /// Gives the old columns' liquid to the new ones.
-    pub fn remap(&mut self) -> Rest {
+    pub fn remap(&mut self) -> Leftover {
         self.parcels.clear();
         self.find_same();
         self.keep();
-        let mut rest = Rest { height: i32::MAX, ..Rest::default() };
+        let mut leftover = Leftover { height: i32::MAX, ..Leftover::default() };
         for at in 0..self.parcels.len() {
             let mut parcel = self.parcels[at];
-            rest.displaced += parcel.units;
-            self.position(&mut parcel);
+            leftover.displaced += parcel.units;
+            self.place(&mut parcel);
             if parcel.units > 0 {
-                rest.units += parcel.units;
-                rest.height = rest.height.min(parcel.height);
-                rest.amounts.iter_mut().zip(parcel.amounts).for_each(|(rest, left)| *rest += left);
+                leftover.units += parcel.units;
+                leftover.height = leftover.height.min(parcel.height);
+                leftover.amounts.iter_mut().zip(parcel.amounts).for_each(|(all, left)| *all += left);
             }
         }
-        rest
+        leftover
     }
 
     /// Finds for each new column the old column that it was.
@@ -118,16 +117,17 @@ impl Cell {
         }
     }
 
-    /// Pairs columns in order, minimising the sum of the displacements of their bases, plus the reach for each column without a pair.
+    /// Pairs columns in order, at the least cost (dynamic programming): twice the displacement of a pair's base, and `reach` for each
+    /// column without a pair.
     fn align(&mut self) {
         let (rows, width) = (self.old.len(), self.new.len() + 1);
-        let way = |old: &Old, new: &New| 2 * (i64::from(old.base) - i64::from(new.base)).abs();
+        let pair_cost = |old: &Old, new: &New| 2 * (i64::from(old.base) - i64::from(new.base)).abs();
         refill(&mut self.costs, (0..width as i64).map(|at| at * self.reach));
         for (row, old) in self.old.iter().enumerate() {
             let before = row * width;
             self.costs.push((row as i64 + 1) * self.reach);
             for (at, new) in self.new.iter().enumerate() {
-                let pair = self.costs[before + at] + way(old, new);
+                let pair = self.costs[before + at] + pair_cost(old, new);
                 let single = self.costs[before + at + 1].min(self.costs[before + width + at]) + self.reach;
                 self.costs.push(pair.min(single));
             }
@@ -136,7 +136,7 @@ impl Cell {
         while row > 0 && at > 0 {
             let cost = self.costs[row * width + at];
             let (old, new) = (&self.old[row - 1], &mut self.new[at - 1]);
-            if cost == self.costs[(row - 1) * width + at - 1] + way(old, new) {
+            if cost == self.costs[(row - 1) * width + at - 1] + pair_cost(old, new) {
                 new.from = old.index;
                 (row, at) = (row - 1, at - 1);
             } else if cost == self.costs[row * width + at - 1] + self.reach {
@@ -165,7 +165,7 @@ impl Cell {
     }
 
     /// Fills columns with a parcel, from its first candidate up, then from there down; the parcel keeps the rest.
-    fn position(&mut self, parcel: &mut Parcel) {
+    fn place(&mut self, parcel: &mut Parcel) {
         if self.under != BOTTOMLESS && parcel.above < self.under {
             return;
         }
@@ -183,7 +183,7 @@ impl Cell {
 
 /// A new column without liquid.
 pub(super) fn dry(index: usize, base: i32, ceiling: i32) -> New {
-    New { index: index as u32, base, ceiling, depth: 0, from: NO, amounts: [0; MAX_SCALARS] }
+    New { index: index as u32, base, ceiling, depth: 0, from: NONE, amounts: [0; MAX_SCALARS] }
 }
 
 #[cfg(test)]
@@ -192,7 +192,7 @@ mod tests {
     use crate::shallow::columns::grid::TOP;
 
     /// Remaps columns of (base, depth) to columns of [base, ceiling]; returns the depths and the rest.
-    fn remap(old: &[(i32, i32)], new: &[[i32; 2]]) -> (Vec<i32>, Rest) {
+    fn remap(old: &[(i32, i32)], new: &[[i32; 2]]) -> (Vec<i32>, Leftover) {
         let mut cell = Cell { under: BOTTOMLESS, reach: 100, ..Cell::default() };
         let column = |(index, &(base, depth)): (usize, &(i32, i32))| Old {
             index: index as u32,
@@ -233,10 +233,10 @@ mod tests {
     fn what_finds_no_room_is_left_over() {
         let (depths, rest) = remap(&[(0, 50), (100, 60)], &[[40, 50], [TOP, TOP]]);
         assert_eq!(depths, [10, 0]);
-        assert_eq!(rest, Rest { units: 100, displaced: 100, ..Rest::default() });
+        assert_eq!(rest, Leftover { units: 100, displaced: 100, ..Leftover::default() });
         assert_eq!(
             remap(&[(7, 50)], &[]).1,
-            Rest { units: 50, height: 7, displaced: 50, amounts: [0; MAX_SCALARS] }
+            Leftover { units: 50, height: 7, displaced: 50, amounts: [0; MAX_SCALARS] }
         );
     }
 
@@ -260,7 +260,7 @@ mod tests {
         let old = |index, base| Old { index, base, depth: 5, amounts: [7 + i64::from(base); MAX_SCALARS] };
         cell.old = vec![old(0, 20), old(1, 200)];
         cell.new = vec![dry(0, 200, TOP)];
-        assert_eq!(cell.remap(), Rest { units: 5, height: 20, displaced: 5, amounts: [27; MAX_SCALARS] });
+        assert_eq!(cell.remap(), Leftover { units: 5, height: 20, displaced: 5, amounts: [27; MAX_SCALARS] });
         assert_eq!(cell.new[0].amounts, [207; MAX_SCALARS]);
         assert_eq!(cell.new[0].depth, 5);
     }

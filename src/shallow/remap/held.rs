@@ -42,7 +42,7 @@ impl Parcel {
     }
 
     /// Whether it is valid over these columns.
-    pub(in crate::shallow) fn is_of(&self, columns: &Columns) -> bool {
+    pub(in crate::shallow) fn is_valid_in(&self, columns: &Columns) -> bool {
         (self.cell as usize) < columns.grid.cells() && self.height >= 0 && self.units > 0
     }
 }
@@ -94,18 +94,18 @@ impl Held {
         }
     }
 
-    /// Removes and returns the parcels in cells for which `is_own` is true.
+    /// Removes the parcels in cells for which `is_own` is true, and passes them to `take`.
     pub(in crate::shallow) fn take_out(
         &mut self,
         is_own: impl Fn(usize) -> bool,
         mut take: impl FnMut(Parcel),
     ) {
         self.parcels.retain(|parcel| {
-            let goes = is_own(parcel.cell as usize);
-            if goes {
+            let is_taken = is_own(parcel.cell as usize);
+            if is_taken {
                 take(*parcel);
             }
-            !goes
+            !is_taken
         });
     }
 

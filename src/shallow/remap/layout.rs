@@ -1,7 +1,7 @@
 //! The new columns of rows, and the liquid that stays in them.
 
 use super::band::Band;
-use super::cells::{Cell, Old, Rest, dry};
+use super::cells::{Cell, Leftover, Old, dry};
 use super::dirty::Dirty;
 use super::held::Held;
 use super::origins::Origins;
@@ -11,7 +11,7 @@ use crate::shallow::columns::{Columns, NONE, STRIP, Strip, strip_mut, strip_of};
 use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::terrain::solids::Solid;
 
-/// If a cell has several columns, bases more than this many cells apart are not of the same column.
+/// If a cell has several columns, one whose base moves by more than this many cells counts as another column.
 const REACH: f64 = 4.0;
 
 /// Buffers.
@@ -28,7 +28,7 @@ pub(super) struct Layout {
 }
 
 /// The rows that are rebuilt.
-pub(super) struct Rows<'a, Cast> {
+pub(super) struct RebuiltRows<'a, Cast> {
     pub dirty: &'a Dirty,
     pub band: &'a Band,
     /// New solids of the dirty cells, by their rank, row by row along x.
@@ -45,8 +45,8 @@ pub(super) struct Liquid<'a> {
 
 impl Layout {
     /// Counts the strips of the new rows.
-    pub fn plan<'s>(&mut self, rows: &Rows<impl Fn(usize) -> &'s [Solid]>) {
-        let Rows { dirty, band, cast } = rows;
+    pub fn plan<'s>(&mut self, rows: &RebuiltRows<impl Fn(usize) -> &'s [Solid]>) {
+        let RebuiltRows { dirty, band, cast } = rows;
         self.layers.clear();
         self.counts.clear();
         let mut next = 0;
@@ -69,15 +69,15 @@ impl Layout {
 
     /// Creates the new columns, for which there must be capacity, and gives them the liquid that finds room in its cell; the rest goes to
     /// `held`. Returns how much did not stay in its column (units).
-    pub fn lay<'s>(
+    pub fn build<'s>(
         &mut self,
-        rows: &Rows<impl Fn(usize) -> &'s [Solid]>,
+        rows: &RebuiltRows<impl Fn(usize) -> &'s [Solid]>,
         columns: &mut Columns,
         liquid: &mut Liquid,
         origins: &mut Origins,
         held: &mut Held,
     ) -> i64 {
-        let Rows { dirty, band, cast } = rows;
+        let RebuiltRows { dirty, band, cast } = rows;
         let blocks = dirty.blocks;
         self.cell.reach = (REACH * columns.grid.cell / columns.heights.unit).min(f64::from(TOP)) as i64;
         let grid = columns.grid;
@@ -101,15 +101,15 @@ impl Layout {
                     block.copy(columns, liquid);
                     continue;
                 }
-                block.lay(columns, |rank| cast(next + rank));
+                block.build(columns, |rank| cast(next + rank));
                 next += cells.count_ones() as usize;
                 let mut moves = block.keep(columns, liquid, self.cell.reach as i32);
                 while moves != 0 {
                     let position = moves.trailing_zeros() as usize;
                     moves &= moves - 1;
-                    block.remap(columns, liquid, position, &mut self.cell, |cell, rest| {
-                        displaced += rest.displaced;
-                        held.add(grid.index(cell), rest.height, rest.units, rest.amounts);
+                    block.remap(columns, liquid, position, &mut self.cell, |cell, leftover| {
+                        displaced += leftover.displaced;
+                        held.add(grid.index(cell), leftover.height, leftover.units, leftover.amounts);
                     });
                 }
             }
@@ -121,8 +121,8 @@ impl Layout {
 /// Sets the positions of the strips of a row, in order.
 fn place_strips(columns: &mut Columns, row: usize, layers: &[u32]) {
     let mut strips = columns.row(row);
-    let most = layers.iter().copied().max().unwrap_or(0);
-    for layer in 0..most {
+    let layer_count = layers.iter().copied().max().unwrap_or(0);
+    for layer in 0..layer_count {
         for (at, _) in layers.iter().enumerate().filter(|(_, count)| **count > layer) {
             let Some(strip) = strips.next() else { return };
             columns.place_strip(strip, Strip { row: row as u32, layer, at: at as u32 });
@@ -186,7 +186,7 @@ impl Block<'_> {
     }
 
     /// Creates the new columns; `cast` gives the solids of the cells that change, by rank.
-    fn lay<'s>(&self, columns: &mut Columns, cast: impl Fn(usize) -> &'s [Solid]) {
+    fn build<'s>(&self, columns: &mut Columns, cast: impl Fn(usize) -> &'s [Solid]) {
         let mut solids = [&[][..]; STRIP];
         let mut rank = 0;
         for (position, solids) in solids.iter_mut().enumerate() {
@@ -267,14 +267,14 @@ impl Block<'_> {
         moves & any
     }
 
-    /// Moves the liquid of a cell to its new columns; `see` receives the cell and the liquid that finds no column.
+    /// Moves the liquid of a cell to its new columns; `keep` receives the cell and the liquid that finds no column.
     fn remap(
         &mut self,
         columns: &Columns,
         liquid: &mut Liquid,
         position: usize,
         cell: &mut Cell,
-        see: impl FnOnce([usize; 2], Rest),
+        keep: impl FnOnce([usize; 2], Leftover),
     ) {
         let band = self.band;
         cell.old.clear();
@@ -297,7 +297,7 @@ impl Block<'_> {
             }
             cell.new.push(dry(index, columns.bases()[index], columns.ceilings()[index]));
         }
-        let rest = cell.remap();
+        let leftover = cell.remap();
         for new in &cell.new {
             liquid.depth[new.index as usize] = new.depth;
             for (amounts, amount) in liquid.amounts.iter_mut().zip(new.amounts) {
@@ -308,6 +308,6 @@ impl Block<'_> {
             self.origins.set(new.index, new.from);
         }
         let strip = band.strips[self.old[0] as usize];
-        see([strip.at as usize * STRIP + position, strip.row as usize], rest);
+        keep([strip.at as usize * STRIP + position, strip.row as usize], leftover);
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! In each cell that changes, columns before and after are matched. Liquid that has no room where it was is pushed up, to other columns of
 //! the cell, to those beside it, or waits until there is room again (`held.rs`): the total never changes. Only the rows with such cells and
-//! those beside them are touched; if the count of columns changes, the data of the rows behind is shifted.
+//! those beside them are touched; if the count of columns changes, the data of later rows is shifted.
 
 mod band;
 mod buffers;
@@ -30,7 +30,7 @@ use crate::numeric::checks::ensure;
 pub use buffers::Remap;
 use carry::{Carry, Change};
 pub use held::{Held, Parcel};
-use layout::{Liquid, Rows};
+use layout::{Liquid, RebuiltRows};
 
 /// Results of a change of the terrain.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -114,8 +114,8 @@ impl Shallow {
 
     fn rebuild_over_bodies(&mut self) -> Moved {
         let mut ground = std::mem::take(&mut self.remap.ground);
-        let apart = |cell| self.apart.as_ref().is_some_and(|apart| apart.has(cell));
-        ground.unite(&self.columns.grid, &self.columns.heights, self.remap.dirty.iter(), apart);
+        let excluded = |cell| self.excluded.as_ref().is_some_and(|excluded| excluded.has(cell));
+        ground.unite(&self.columns.grid, &self.columns.heights, self.remap.dirty.iter(), excluded);
         let moved = self.rebuild(|rank| ground.united(rank));
         self.remap.ground = ground;
         moved
@@ -129,13 +129,13 @@ impl Shallow {
             return Moved { held: self.remap.held.units() as f64 * volume, ..Moved::default() };
         }
         let around = rows.start.saturating_sub(1)..(rows.end + 1).min(self.columns.grid.size[1]);
-        self.let_go_of(around.clone());
-        let displaced = self.relay(cast, rows.clone(), around.clone());
-        let is_same = self.join(around.clone());
+        self.release_packets_of(around.clone());
+        let displaced = self.rebuild_columns(cast, rows.clone(), around.clone());
+        let has_same_links = self.rebuild_pipes(around.clone());
         self.identity = Identity::new();
-        self.flow.refit(&self.columns, &self.pipes, rows, is_same);
+        self.flow.refit(&self.columns, &self.pipes, rows, has_same_links);
         self.flows.find_again(&self.columns);
-        let fallen = self.land_buried() + self.release();
+        let fallen = self.land_buried() + self.settle_held();
         Moved {
             cells: self.remap.dirty.count(),
             displaced: displaced as f64 * volume,
@@ -145,7 +145,7 @@ impl Shallow {
     }
 
     /// Rebuilds the columns of rows and gives them their liquid; returns how much did not stay in its column (units).
-    fn relay<'a>(
+    fn rebuild_columns<'a>(
         &mut self,
         cast: impl Fn(usize) -> &'a [Solid],
         rows: Range<usize>,
@@ -155,7 +155,7 @@ impl Shallow {
         let Remap { dirty, band, layout, origins, carry, held, .. } = remap;
         carry.save(columns, &pipes.links, flow, around);
         band.save(columns, flow, rows.clone());
-        let change = Rows { dirty, band, cast };
+        let change = RebuiltRows { dirty, band, cast };
         layout.plan(&change);
         columns.resize_rows(rows.clone(), layout.counts.iter().copied());
         let strips = columns.row(rows.start).start..columns.row(rows.end - 1).end;
@@ -167,18 +167,18 @@ impl Shallow {
         flow.resize_part(old, len);
         let amounts = flow.amounts.amounts.each_mut().map(|amounts| &mut amounts[..]);
         let mut liquid = Liquid { depth: &mut flow.depth, amounts };
-        let displaced = layout.lay(&change, columns, &mut liquid, origins, held);
+        let displaced = layout.build(&change, columns, &mut liquid, origins, held);
         origins.finish();
         columns.connect(rows);
         displaced
     }
 
     /// Rebuilds the pipes of rows, with their fluxes; returns whether the links still join the same columns.
-    fn join(&mut self, rows: Range<usize>) -> bool {
-        let Self { columns, pipes, flow, remap, params, falls, apart, .. } = self;
+    fn rebuild_pipes(&mut self, rows: Range<usize>) -> bool {
+        let Self { columns, pipes, flow, remap, params, falls, excluded, .. } = self;
         let Remap { band, origins, carry, finder, ends, links, .. } = remap;
         links.clear();
-        let rules = Rules::of(params, columns, apart.as_ref());
+        let rules = Rules::of(params, columns, excluded.as_ref());
         finder.find(columns, &rules, rows.clone(), [&mut pipes.east, &mut pipes.south], links);
         let change = Change { columns, band, origins };
         carry.links(&change, flow, links);
@@ -186,20 +186,20 @@ impl Shallow {
         Carry::heads(&change, flow);
         let old = pipes.links.row(rows.start).start..pipes.links.row(rows.end - 1).end;
         let shift = origins.shift().wrapping_mul(STRIP as u32);
-        let is_same = shift == 0 && carry.is_same(links);
-        flow.links.replace(old.clone(), &carry.flux, &carry.left, flow.amounts.count());
+        let has_same_links = shift == 0 && carry.has_same_links(links);
+        flow.links.replace(old.clone(), &carry.flux, &carry.remainder, flow.amounts.count());
         if params.falls.is_some() {
             falls.replace(old.clone(), links.len());
         }
         pipes.links.replace_rows(rows, links, shift);
-        if !is_same {
+        if !has_same_links {
             pipes.links.list_columns(columns, ends);
         }
-        is_same
+        has_same_links
     }
 
-    /// Gives waiting liquid the room that there is now; returns what fell into the void (units).
-    pub(super) fn release(&mut self) -> i64 {
+    /// Moves waiting liquid to where there is room now; returns what fell into the void (units).
+    pub(super) fn settle_held(&mut self) -> i64 {
         let fallen = self.remap.held.settle(&self.columns, &mut self.flow);
         self.flow.links.lost += fallen;
         fallen

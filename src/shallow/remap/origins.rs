@@ -1,4 +1,4 @@
-//! Which former column each column was.
+//! Maps columns to the columns that they were before a change.
 
 use super::band::Band;
 use crate::numeric::lists::reset;
@@ -14,12 +14,12 @@ pub(super) struct Origins {
     /// there.
     strips: Vec<(u32, u16)>,
     /// Columns that were in other layers: their indices, and the former ones, within the band.
-    pub odd: Vec<[u32; 2]>,
+    pub relayered: Vec<[u32; 2]>,
 }
 
 impl Default for Origins {
     fn default() -> Self {
-        Self { first: 0, counts: [0; 2], strips: Vec::new(), odd: Vec::with_capacity(1024) }
+        Self { first: 0, counts: [0; 2], strips: Vec::new(), relayered: Vec::with_capacity(1024) }
     }
 }
 
@@ -29,7 +29,7 @@ impl Origins {
         self.first = band.first;
         self.counts = [band.strips.len(), count];
         reset(&mut self.strips, count, (NONE, 0));
-        self.odd.clear();
+        self.relayered.clear();
     }
 
     /// Records that some columns of a strip were in a strip of the band.
@@ -47,16 +47,16 @@ impl Origins {
         if old / STRIP as u32 == *from {
             *positions |= 1 << position;
         } else {
-            self.odd.push([index, old]);
+            self.relayered.push([index, old]);
         }
     }
 
     /// Finishes a band.
     pub fn finish(&mut self) {
-        self.odd.sort_unstable();
+        self.relayered.sort_unstable();
     }
 
-    /// How much the numbers of strips behind the band grow, modulo 2^32.
+    /// How much the indices of strips after the band grow, modulo 2^32.
     pub fn shift(&self) -> u32 {
         self.counts[1].wrapping_sub(self.counts[0]) as u32
     }
@@ -81,7 +81,7 @@ impl Origins {
         if positions >> position & 1 == 1 {
             return Some((strip * STRIP + position) as u32);
         }
-        let at = self.odd.binary_search_by_key(&index, |[index, _]| *index).ok()?;
-        Some(self.odd[at][1] + (self.first * STRIP) as u32)
+        let at = self.relayered.binary_search_by_key(&index, |[index, _]| *index).ok()?;
+        Some(self.relayered[at][1] + (self.first * STRIP) as u32)
     }
 }

@@ -1,4 +1,4 @@
-//! After a change the terrain must be in the same state as a newly created one.
+//! After a change of the terrain, a liquid must be in the same state as one created on the new terrain.
 
 use super::*;
 use crate::context::{Context, Pool};
@@ -70,16 +70,16 @@ fn carried(shallow: &Shallow) -> Vec<([usize; 7], [u32; 2])> {
     for i in columns.indices() {
         let (strip, position) = (i / STRIP, i % STRIP);
         if shallow.pipes.east[i] > 0.0 {
-            add(i, Some(i + 1), 0, [flow.flux[0][i], flow.left[0][i]]);
+            add(i, Some(i + 1), 0, [flow.flux[0][i], flow.remainder[0][i]]);
         }
         if shallow.pipes.south[i] > 0.0 {
             let j = columns.south(strip) as usize * STRIP + position;
-            add(i, Some(j), 1, [flow.flux[1][i], flow.left[1][i]]);
+            add(i, Some(j), 1, [flow.flux[1][i], flow.remainder[1][i]]);
         }
     }
     for link in 0..links.len() {
         let to = (links.to[link] != NONE).then_some(links.to[link] as usize);
-        let carried = [flow.links.flux[link], flow.links.left[link]];
+        let carried = [flow.links.flux[link], flow.links.remainder[link]];
         add(links.from[link] as usize, to, links.sides[link] as usize, carried);
     }
     all.sort_unstable();
@@ -87,32 +87,32 @@ fn carried(shallow: &Shallow) -> Vec<([usize; 7], [u32; 2])> {
 }
 
 /// A new liquid on the same terrain with the same state.
-fn made_anew(ctx: &Context, shallow: &Shallow, solids: &Solids) -> Shallow {
+fn created_anew(ctx: &Context, shallow: &Shallow, solids: &Solids) -> Shallow {
     let mut new = Shallow::new(ctx, solids, shallow.params.clone()).unwrap();
-    assert!(new.columns == shallow.columns, "other columns");
-    assert!(new.pipes == shallow.pipes, "other pipes");
+    assert!(new.columns == shallow.columns, "different columns");
+    assert!(new.pipes == shallow.pipes, "different pipes");
     for index in 0..new.columns.len() {
         let units = i64::from(shallow.flow.depth[index]);
         assert_eq!(new.flow.change_depth(&new.columns, index, units), units);
     }
     new.flow.flux = shallow.flow.flux.clone();
-    new.flow.left = shallow.flow.left.clone();
+    new.flow.remainder = shallow.flow.remainder.clone();
     new.flow.links = shallow.flow.links.clone();
     new.flow.last = shallow.flow.last;
-    new.flow.network.over_mut().copy_from_slice(shallow.flow.network.over());
+    new.flow.network.excess_heads_mut().copy_from_slice(shallow.flow.network.excess_heads());
     new.time = shallow.time;
     new.remap.held.set(shallow.remap.held.parcels().iter().copied());
     new
 }
 
 fn assert_same(a: &Shallow, b: &Shallow, what: &str) {
-    assert!(a.flow.depth == b.flow.depth, "{what}: other depths");
-    assert!(carried(a) == carried(b), "{what}: other fluxes");
-    assert!(a.remap.held.parcels() == b.remap.held.parcels(), "{what}: other parcels");
+    assert!(a.flow.depth == b.flow.depth, "{what}: different depths");
+    assert!(carried(a) == carried(b), "{what}: different fluxes");
+    assert!(a.remap.held.parcels() == b.remap.held.parcels(), "{what}: different parcels");
 }
 
 #[test]
-fn a_changed_terrain_flows_on_like_one_made_anew() {
+fn liquid_on_changed_terrain_flows_like_on_new_terrain() {
     let ctx = Context::new(Pool::new(0).unwrap());
     let mut dice = Dice(0x9e37_79b9_7f4a_7c15);
     for scene in 0..60 {
@@ -157,7 +157,7 @@ fn a_changed_terrain_flows_on_like_one_made_anew() {
             // The first cell may lie outside the box.
             shallow.update_cells([0..1, 0..1], |_| solids.cell(0)).unwrap();
             assert_eq!(shallow.balance().error, 0, "{what}");
-            let mut new = made_anew(&ctx, &shallow, &solids);
+            let mut new = created_anew(&ctx, &shallow, &solids);
             for _ in 0..2 {
                 shallow.step(&ctx, 0.03).unwrap();
                 new.step(&ctx, 0.03).unwrap();
@@ -253,11 +253,11 @@ fn flux_follows_a_column_into_another_layer() {
 }
 
 #[test]
-fn cliffs_that_come_and_go_are_links_as_in_a_terrain_made_anew() {
+fn cliffs_that_come_and_go_are_links_as_in_new_terrain() {
     let ctx = Context::new(Pool::new(0).unwrap());
     let mut dice = Dice(77);
     let grid = Grid { cell: 0.5, origin: [0.0; 2], size: [40, 12] };
-    let falls = Some(Falls { height: 1.0, drop: 0.0, most: 1 << 16, ..Falls::default() });
+    let falls = Some(Falls { height: 1.0, drop: 0.0, max_packets: 1 << 16, ..Falls::default() });
     let mut cells: Vec<Vec<Solid>> = (0..grid.cells()).map(|_| cell(&mut dice, 2)).collect();
     let params = Params { falls, friction: Friction::Walls, ..params(Border::Open) };
     let mut shallow = Shallow::new(&ctx, &solids(grid, &cells), params).unwrap();
@@ -302,5 +302,5 @@ fn a_saved_state_keeps_what_waits_for_room() {
     assert!(shallow.remap.held.parcels() == held && shallow.balance() == balance);
     assert_eq!(balance.error, 0);
     shallow.step(&ctx, 0.05).unwrap();
-    assert!(shallow.save() == next, "another state");
+    assert!(shallow.save() == next, "a different state");
 }

@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::numeric::bytes::Reader;
 use crate::shallow::columns::STRIP;
 use crate::shallow::columns::runs::runs;
-use crate::shallow::free_fall::{LIP, PACKET};
+use crate::shallow::free_fall::{PACKET_BYTES, WAITING_BYTES};
 use crate::shallow::scalars::amounts::ACCOUNTS;
 use crate::shallow::system::Shallow;
 
@@ -71,8 +71,8 @@ impl Counts {
             + 8 * self.runs
             + 4 * self.rows
             + 16 * self.parcels
-            + PACKET * self.packets
-            + LIP * self.lips
+            + PACKET_BYTES * self.packets
+            + WAITING_BYTES * self.lips
             + 24 * self.points
             + 8 * self.links
             + (4 + SHARE) * self.heads
@@ -144,7 +144,7 @@ impl Header {
 
 /// Active strips that have the head of a full column.
 pub(super) fn heads(shallow: &Shallow) -> impl Iterator<Item = (usize, &[f32; STRIP])> {
-    let all = shallow.flow.network.over().as_chunks::<STRIP>().0;
+    let all = shallow.flow.network.excess_heads().as_chunks::<STRIP>().0;
     let strips = runs(shallow.flow.active()).flatten().map(move |strip| (strip, &all[strip]));
     strips.filter(|(_, heads)| heads.iter().fold(0, |any, head| any | head.to_bits()) != 0)
 }

@@ -9,8 +9,8 @@
 //! | runs of active strips: the first, and how many | 8 each |
 //! | upper bound of the depth of each row | 4 each |
 //! | liquid that waits for room: its cell, its height, units | 16 each |
-//! | packets in the air | [`PACKET`] each |
-//! | liquid that waits at links to fall, if the liquid has falls | [`LIP`] each |
+//! | packets in the air | [`PACKET_BYTES`] each |
+//! | liquid that waits at links to fall, if the liquid has falls | [`WAITING_BYTES`] each |
 //! | flow points: kind, 0, units pending, units moved | 24 each |
 //! | fluxes of links, then remainders of their transfers | 4 each |
 //! | strips of full columns with heads, then their heads | 4 each, then 64 each |
@@ -28,7 +28,7 @@ use std::ops::{Range, RangeInclusive};
 use super::columns::grid::{BOTTOMLESS, TOP};
 use super::columns::runs::runs;
 use super::columns::{Columns, STRIP};
-use super::free_fall::{LIP, PACKET, Packet, Waiting};
+use super::free_fall::{PACKET_BYTES, Packet, WAITING_BYTES, Waiting};
 use super::pipes::Border;
 use super::remap::Parcel;
 use super::sources::Kind;
@@ -129,7 +129,7 @@ impl Shallow {
             to.bytes(&moved.to_le_bytes());
         }
         to.numbers(&flow.links.flux, f32::to_le_bytes);
-        to.numbers(&flow.links.left, f32::to_le_bytes);
+        to.numbers(&flow.links.remainder, f32::to_le_bytes);
         heads(self).for_each(|(strip, _)| to.bytes(&(strip as u32).to_le_bytes()));
         heads(self).for_each(|(_, heads)| to.numbers(heads, f32::to_le_bytes));
         for run in runs(flow.active()) {
@@ -151,7 +151,7 @@ impl Shallow {
             terrain: self.identity.hash(&self.columns),
             counts: *counts,
             times: [self.time, self.flow.last],
-            still: self.still,
+            still: self.still_level,
             sums: [self.poured, flows.sourced, flows.drained, flows.absorbed, links.lost, links.gained],
             since: self.falls.since,
             tick: self.falls.tick,
@@ -165,8 +165,8 @@ struct Saved<'a> {
     runs: &'a [[u8; 8]],
     row_depths: &'a [[u8; 4]],
     parcels: &'a [[u8; 16]],
-    packets: &'a [[u8; PACKET]],
-    lips: &'a [[u8; LIP]],
+    packets: &'a [[u8; PACKET_BYTES]],
+    lips: &'a [[u8; WAITING_BYTES]],
     points: &'a [[u8; 24]],
     /// Fluxes, then remainders.
     links: &'a [[u8; 4]],
@@ -210,7 +210,7 @@ impl<'a> Saved<'a> {
         }
         // On the same terrain, links differ only because of cliffs.
         let (links, most) =
-            (shallow.flow.links.flux.len(), shallow.params.falls.map_or(0, |falls| falls.most));
+            (shallow.flow.links.flux.len(), shallow.params.falls.map_or(0, |falls| falls.max_packets));
         if (counts.links, counts.lips) != (links, shallow.falls.waiting.len()) || counts.packets > most {
             return Err(refused("belongs to a liquid with other falls"));
         }
@@ -247,7 +247,7 @@ impl<'a> Saved<'a> {
             && self.points.iter().all(|point| WAITING.contains(&f64::from_le_bytes(part(point, 8))))
             && self.points.iter().all(|point| SUMS.contains(&i64::from_le_bytes(part(point, 16))))
             && self.row_depths.iter().all(within)
-            && self.parcels().all(|parcel| parcel.is_of(columns) && SUMS.contains(&parcel.units))
+            && self.parcels().all(|parcel| parcel.is_valid_in(columns) && SUMS.contains(&parcel.units))
             && self.parcels().is_sorted_by(|a, b| a.cell < b.cell)
             && !is_over(fluxes, MOST_FLUX)
             && !is_over(left, 1.0)
@@ -259,11 +259,10 @@ impl<'a> Saved<'a> {
     fn has_good_falls(&self, shallow: &Shallow) -> bool {
         let (columns, links) = (&shallow.columns, &shallow.pipes.links);
         (0.0..=1e6).contains(&self.header.since)
-            && self.packets().all(|packet| packet.is_of(columns) && SUMS.contains(&packet.units))
-            && self
-                .lips()
-                .enumerate()
-                .all(|(link, waiting)| waiting.is_of(columns, links, link) && SUMS.contains(&waiting.units))
+            && self.packets().all(|packet| packet.is_valid_in(columns) && SUMS.contains(&packet.units))
+            && self.lips().enumerate().all(|(link, waiting)| {
+                waiting.is_valid_in(columns, links, link) && SUMS.contains(&waiting.units)
+            })
     }
 
     fn has_bad_columns(&self, columns: &Columns) -> bool {
@@ -338,7 +337,7 @@ impl<'a> Saved<'a> {
         get(self.row_depths.as_flattened(), stored.bands.row_depths_mut(), i32::from_le_bytes);
         let (fluxes, left) = self.links.split_at(self.header.counts.links);
         get(fluxes.as_flattened(), &mut stored.links.flux, f32::from_le_bytes);
-        get(left.as_flattened(), &mut stored.links.left, f32::from_le_bytes);
+        get(left.as_flattened(), &mut stored.links.remainder, f32::from_le_bytes);
         (stored.links.lost, stored.links.gained) = (lost, gained);
         *stored.last = self.header.times[1];
         flow.wake(columns, self.runs());
@@ -346,7 +345,8 @@ impl<'a> Saved<'a> {
             flows.set_progress(at, f64::from_le_bytes(part(point, 8)), i64::from_le_bytes(part(point, 16)));
         }
         (flows.sourced, flows.drained, flows.absorbed) = (sourced, drained, absorbed);
-        (shallow.poured, shallow.time, shallow.still) = (poured, self.header.times[0], self.header.still);
+        (shallow.poured, shallow.time, shallow.still_level) =
+            (poured, self.header.times[0], self.header.still);
         shallow.steps.clear();
     }
 }
@@ -357,7 +357,7 @@ fn has_bad_columns(saved: &Saved<'_>, columns: &Columns) -> bool {
     let [bases, ceilings] =
         [columns.bases(), columns.ceilings()].map(|numbers| numbers.as_chunks::<STRIP>().0);
     let (mut bad, mut is_over_any) = (0, false);
-    for (run, [depth, east, south, left_east, left_south]) in saved.arrays() {
+    for (run, [depth, east, south, remainder_east, remainder_south]) in saved.arrays() {
         for (strip, depths) in run.zip(depth) {
             let row_depth = i32::from_le_bytes(saved.row_depths[columns.strips()[strip].row as usize]);
             let (base, ceiling) = (&bases[strip], &ceilings[strip]);
@@ -367,7 +367,9 @@ fn has_bad_columns(saved: &Saved<'_>, columns: &Columns) -> bool {
                 bad |= depth | room.wrapping_sub(depth) | row_depth.wrapping_sub(depth);
             }
         }
-        for (numbers, most) in [(east, MOST_FLUX), (south, MOST_FLUX), (left_east, 1.0), (left_south, 1.0)] {
+        for (numbers, most) in
+            [(east, MOST_FLUX), (south, MOST_FLUX), (remainder_east, 1.0), (remainder_south, 1.0)]
+        {
             is_over_any |= is_over(numbers.as_flattened().as_chunks().0, most);
         }
     }

@@ -67,7 +67,7 @@ impl Shallow {
                 return Err(Error::argument(format!("two scalars have the name {:?}", scalar.name)));
             }
         }
-        self.flow.carry(&self.columns, Amounts::new(scalars.to_vec(), self.columns.len() + STRIP));
+        self.flow.set_scalars(&self.columns, Amounts::new(scalars.to_vec(), self.columns.len() + STRIP));
         self.flows.forget_levels();
         self.remap.held.forget_amounts();
         self.falls.forget_amounts();

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use super::rest::Still;
+use super::rest::RestSearch;
 use crate::numeric::lists::reset;
 use crate::shallow::columns::runs::find;
 use crate::shallow::columns::{Columns, NONE, STRIP, resize_part, strip_of};
@@ -203,10 +203,10 @@ impl Active {
         depth: &[i32],
         runs: impl Iterator<Item = Range<usize>> + Clone,
     ) {
-        self.rouse_all();
+        self.wake_all();
         let mut end = 0;
         for run in runs.clone() {
-            self.let_sleep(columns, end..run.start);
+            self.deactivate(columns, end..run.start);
             end = run.end;
             for strip in run {
                 let (own, _) = depth[strip * STRIP..].split_at(STRIP);
@@ -215,9 +215,9 @@ impl Active {
                 self.activate(columns, strip);
             }
         }
-        self.let_sleep(columns, end..self.active.len());
+        self.deactivate(columns, end..self.active.len());
         for strip in runs.flatten() {
-            if self.wet[strip] && self.may_be_alone(columns, strip) {
+            if self.wet[strip] && self.may_have_inactive_neighbour(columns, strip) {
                 self.wake(columns, strip);
             }
         }
@@ -225,7 +225,7 @@ impl Active {
     }
 
     /// Whether a strip might have an inactive neighbour. A cheap test: nearly always none is.
-    fn may_be_alone(&self, columns: &Columns, strip: usize) -> bool {
+    fn may_have_inactive_neighbour(&self, columns: &Columns, strip: usize) -> bool {
         let active = |other: u32| other == NONE || self.active[other as usize];
         let next = self.active.get(strip + 1).is_none_or(|next| *next);
         let before = strip == 0 || self.active[strip - 1];
@@ -234,7 +234,7 @@ impl Active {
     }
 
     /// Deactivates the strips of a range.
-    fn let_sleep(&mut self, columns: &Columns, strips: Range<usize>) {
+    fn deactivate(&mut self, columns: &Columns, strips: Range<usize>) {
         let mut strip = find(&self.active[..strips.end], strips.start, true);
         while strip < strips.end {
             (self.active[strip], self.wet[strip], self.moving[strip]) = (false, false, false);
@@ -247,18 +247,23 @@ impl Active {
     pub fn wake(&mut self, columns: &Columns, strip: usize) {
         (self.wet[strip], self.moving[strip]) = (true, true);
         self.activate(columns, strip);
-        self.for_each_beside(columns, strip, |active, other| active.activate(columns, other));
+        self.for_each_neighbour(columns, strip, |active, other| active.activate(columns, other));
     }
 
-    /// Calls `see` with each strip that a pipe leads to from `strip`.
-    fn for_each_beside(&mut self, columns: &Columns, strip: usize, mut see: impl FnMut(&mut Self, usize)) {
+    /// Calls `visit` with each strip that a pipe leads to from `strip`.
+    fn for_each_neighbour(
+        &mut self,
+        columns: &Columns,
+        strip: usize,
+        mut visit: impl FnMut(&mut Self, usize),
+    ) {
         let beside = [columns.east(strip), columns.west(strip)];
-        beside.into_iter().flatten().for_each(|other| see(self, other));
+        beside.into_iter().flatten().for_each(|other| visit(self, other));
         for other in [columns.north(strip), columns.south(strip)].into_iter().filter(|&other| other != NONE) {
-            see(self, other as usize);
+            visit(self, other as usize);
         }
         for link in self.linked_starts[strip]..self.linked_starts[strip + 1] {
-            see(self, self.linked[link as usize] as usize);
+            visit(self, self.linked[link as usize] as usize);
         }
     }
 
@@ -269,14 +274,15 @@ impl Active {
         }
     }
 
-    /// Wakes all strips: what rests must be decided again.
-    pub fn rouse_all(&mut self) {
+    /// Wakes all strips, so that the next frame decides anew which rest.
+    pub fn wake_all(&mut self) {
         self.asleep.fill(false);
         self.moving.copy_from_slice(&self.wet);
         (0..self.stale.len()).for_each(|row| self.make_stale(row));
     }
 
-    fn rouse(&mut self, columns: &Columns, strip: usize) {
+    /// Ends the sleep of a strip.
+    fn end_sleep(&mut self, columns: &Columns, strip: usize) {
         if std::mem::take(&mut self.asleep[strip]) {
             self.make_stale(columns.strips()[strip].row as usize);
         }
@@ -300,9 +306,9 @@ impl Active {
     }
 
     /// Finds the wet strips, and deactivates those that are dry and beside dry ones; `dried` is called with the indices of each.
-    pub fn settle(&mut self, columns: &Columns, depth: &[i32], mut dried: impl FnMut(Range<usize>)) {
+    pub fn deactivate_dry(&mut self, columns: &Columns, depth: &[i32], mut dried: impl FnMut(Range<usize>)) {
         let rows = self.counts.len();
-        // Sleeping strips stay as wet as they are, and so do those beside them.
+        // Sleeping strips keep their state, and so do those beside them.
         let Self { wet, active, asleep, counts, .. } = self;
         for row in (0..rows).filter(|&row| counts[row] > 0) {
             for strip in columns.row(row).filter(|&strip| active[strip] && !asleep[strip]) {
@@ -311,7 +317,7 @@ impl Active {
         }
         for row in 0..rows {
             for strip in if self.counts[row] > 0 { columns.row(row) } else { 0..0 } {
-                if self.is_awake(strip) && !self.is_beside(columns, strip, &self.wet) {
+                if self.is_awake(strip) && !self.is_marked_around(columns, strip, &self.wet) {
                     (self.active[strip], self.moving[strip]) = (false, false);
                     self.make_stale(row);
                     dried(strip * STRIP..(strip + 1) * STRIP);
@@ -321,18 +327,18 @@ impl Active {
     }
 
     /// Puts strips to sleep that rest, and whose neighbours rest.
-    pub fn fall_asleep(&mut self, still: &Still) {
-        let (columns, rows) = (still.columns, self.counts.len());
+    pub fn fall_asleep(&mut self, search: &RestSearch) {
+        let (columns, rows) = (search.columns, self.counts.len());
         for row in 0..rows {
             for strip in if self.counts[row] > 0 { columns.row(row) } else { 0..0 } {
                 if self.is_awake(strip) {
-                    self.moving[strip] = self.wet[strip] && !still.rests(strip);
+                    self.moving[strip] = self.wet[strip] && !search.rests(strip);
                 }
             }
         }
         for row in 0..rows {
-            let links = if self.resting[row] { 0..0 } else { still.pipes.links.row(row) };
-            for [from, to] in still.moving_links(links) {
+            let links = if self.resting[row] { 0..0 } else { search.pipes.links.row(row) };
+            for [from, to] in search.moving_links(links) {
                 for end in [from, to].into_iter().filter(|&end| end != NONE) {
                     let strip = end as usize / STRIP;
                     self.moving[strip] |= self.is_awake(strip);
@@ -344,13 +350,13 @@ impl Active {
         for row in 0..rows {
             for strip in if self.any_asleep && self.counts[row] > 0 { columns.row(row) } else { 0..0 } {
                 if self.moving[strip] {
-                    self.for_each_beside(columns, strip, |active, other| active.rouse(columns, other));
+                    self.for_each_neighbour(columns, strip, |active, other| active.end_sleep(columns, other));
                 }
             }
         }
         for row in 0..rows {
             for strip in if self.counts[row] > 0 { columns.row(row) } else { 0..0 } {
-                if self.is_awake(strip) && !self.is_beside(columns, strip, &self.moving) {
+                if self.is_awake(strip) && !self.is_marked_around(columns, strip, &self.moving) {
                     (self.asleep[strip], self.any_asleep) = (true, true);
                     self.make_stale(row);
                 }
@@ -360,7 +366,7 @@ impl Active {
             if !self.resting[row] && !columns.row(row).any(|strip| self.is_awake(strip)) {
                 let mut owners = row.saturating_sub(1)..row + 1;
                 self.resting[row] =
-                    owners.all(|row| still.moving_links(still.pipes.links.row(row)).next().is_none());
+                    owners.all(|row| search.moving_links(search.pipes.links.row(row)).next().is_none());
             }
         }
     }
@@ -371,7 +377,7 @@ impl Active {
     }
 
     /// Whether a strip, or one that a pipe leads to, is marked.
-    fn is_beside(&self, columns: &Columns, strip: usize, marks: &[bool]) -> bool {
+    fn is_marked_around(&self, columns: &Columns, strip: usize, marks: &[bool]) -> bool {
         let marked = |strip: usize| marks[strip];
         let beyond = |strip: u32| strip != NONE && marked(strip as usize);
         let links = self.linked_starts[strip] as usize..self.linked_starts[strip + 1] as usize;
@@ -415,7 +421,7 @@ impl Active {
                 north: at(north),
             };
             // A span may bridge a gap of cells: the pipe over it is closed.
-            let goes_on = |last: &Span| {
+            let continues = |last: &Span| {
                 let follows = |last_at: u32, at: u32| {
                     if last_at == NONE { at == NONE } else { at == last_at + last.len }
                 };
@@ -424,7 +430,7 @@ impl Active {
                     && follows(last.north, own.north)
             };
             let spans = &mut self.spans[first..];
-            if count > 0 && goes_on(&spans[count - 1]) {
+            if count > 0 && continues(&spans[count - 1]) {
                 spans[count - 1].len += own.len;
             } else {
                 spans[count] = own;

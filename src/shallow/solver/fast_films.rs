@@ -17,9 +17,9 @@ use crate::shallow::columns::{NONE, STRIP, resize_part, strip_from, strip_of};
 /// (c dt / dx)^2 of a fast pipe: below 1/2, the bound of stability.
 pub const FAST_WAVES: f32 = 0.35;
 /// Maximum inertia factor: shallower films are never fast for long.
-const LIGHTEST: f32 = 16.0;
-/// Minimum inertia factor of a fast pipe: it must differ from that of others once packed.
-const HEAVIEST: f32 = 1.0 + 1.0 / 128.0;
+const MAX_LIGHT: f32 = 16.0;
+/// Minimum inertia factor of a fast pipe: once packed, it must differ from 1, which all other pipes have.
+const MIN_LIGHT: f32 = 1.0 + 1.0 / 128.0;
 
 /// Inertia factors of a column whose pipes are not fast (`packed`).
 pub const NORMAL: u32 = 0x3f80_3f80;
@@ -49,7 +49,7 @@ pub struct Films<'a> {
 
 /// A span of a row and the columns to the south of it; the depths have one more element than the fluxes: the column to the east.
 #[derive(Clone, Copy)]
-struct Span<'a> {
+struct FilmSpan<'a> {
     depth: &'a [i32],
     south_depth: &'a [i32],
     flux: [&'a [f32]; 2],
@@ -85,31 +85,31 @@ impl Fast {
     }
 
     /// Finds the rows with fast pipes. Returns a count of cells, a power of two: the smallest that no disturbance exceeds during `step`
-    /// times the last step, or `farthest` if that is less.
-    pub fn find(&mut self, films: &Films, step: f32, farthest: u32) -> u32 {
+    /// times the last step, or `max_cells` if that is less.
+    pub fn find(&mut self, films: &Films, step: f32, max_cells: u32) -> u32 {
         let rows = &mut self.rows[..];
-        dispatch!(find_rows(rows: &mut [bool], films: &Films, step: f32, farthest: u32) -> u32)
+        dispatch!(find_rows(rows: &mut [bool], films: &Films, step: f32, max_cells: u32) -> u32)
     }
 
     /// Finds the inertia factors of the fast pipes of those rows, for steps like `step`.
-    pub fn lighten(&mut self, films: &Films, step: &Step) {
+    pub fn reduce_inertia(&mut self, films: &Films, step: &Step) {
         let fast = self;
-        dispatch!(lighten_rows(fast: &mut Fast, films: &Films, step: &Step))
+        dispatch!(reduce_inertia_rows(fast: &mut Fast, films: &Films, step: &Step))
     }
 }
 
 #[inline(always)]
-fn find_rows(rows: &mut [bool], films: &Films, step: f32, farthest: u32) -> u32 {
+fn find_rows(rows: &mut [bool], films: &Films, step: f32, max_cells: u32) -> u32 {
     let mut cells = 1;
     for (row, is_fast) in rows.iter_mut().enumerate() {
         // Rows that were fast mostly still are.
         let was_fast = std::mem::take(is_fast);
         for (_, span) in films.row(row) {
             if was_fast || span.may_be_fast(films.drive) {
-                if cells < farthest {
+                if cells < max_cells {
                     let [any, mut farther] = span.find::<true>(films.drive, step / cells as f32);
                     *is_fast |= any;
-                    while farther && cells < farthest {
+                    while farther && cells < max_cells {
                         cells *= 2;
                         farther = span.find::<true>(films.drive, step / cells as f32)[1];
                     }
@@ -123,7 +123,7 @@ fn find_rows(rows: &mut [bool], films: &Films, step: f32, farthest: u32) -> u32 
 }
 
 #[inline(always)]
-fn lighten_rows(fast: &mut Fast, films: &Films, step: &Step) {
+fn reduce_inertia_rows(fast: &mut Fast, films: &Films, step: &Step) {
     let Fast { light, strips: is_fast, rows } = fast;
     for row in (0..rows.len()).filter(|&row| rows[row]) {
         // Includes strips that wake up during this frame.
@@ -133,14 +133,14 @@ fn lighten_rows(fast: &mut Fast, films: &Films, step: &Step) {
         for (first, span) in films.row(row) {
             let light = &mut light[first..first + span.flux[0].len()];
             for (at, light) in light.as_chunks_mut().0.iter_mut().enumerate() {
-                is_fast[first / STRIP + at] = lighten_strip(&span.strip(at), films.drive, step, light);
+                is_fast[first / STRIP + at] = reduce_inertia_strip(&span.strip(at), films.drive, step, light);
             }
         }
     }
 }
 
 #[inline(always)]
-fn lighten_strip(strip: &Strip, drive: f32, step: &Step, light: &mut [u32; STRIP]) -> bool {
+fn reduce_inertia_strip(strip: &Strip, drive: f32, step: &Step, light: &mut [u32; STRIP]) -> bool {
     let mut any = 0;
     let Strip { depth, east_depth, south_depth, flux: [east, south] } = strip;
     for x in 0..STRIP {
@@ -163,11 +163,11 @@ struct Strip<'a> {
 impl<'a> Films<'a> {
     /// The spans of a row, by their first column.
     #[inline(always)]
-    fn row(self, row: usize) -> impl Iterator<Item = (usize, Span<'a>)> {
+    fn row(self, row: usize) -> impl Iterator<Item = (usize, FilmSpan<'a>)> {
         self.active.row(row).iter().map(move |span| {
             let (first, len) = (span.first as usize, span.len as usize);
             let south = if span.south == NONE { first } else { span.south as usize };
-            let part = Span {
+            let part = FilmSpan {
                 depth: &self.depth[first..=first + len],
                 south_depth: &self.depth[south..south + len],
                 flux: self.flux.map(|flux| &flux[first..first + len]),
@@ -177,7 +177,7 @@ impl<'a> Films<'a> {
     }
 }
 
-impl<'a> Span<'a> {
+impl<'a> FilmSpan<'a> {
     /// Count of its strips.
     #[inline(always)]
     fn strips(&self) -> usize {
@@ -194,31 +194,31 @@ impl<'a> Span<'a> {
         }
     }
 
-    /// Whether one of its pipes could be fast: tests the largest flux with the shallowest depth.
+    /// Whether one of its pipes could be fast: tests the largest flux with the smallest depth.
     #[inline(always)]
     fn may_be_fast(&self, drive: f32) -> bool {
-        // Dry columns, which this maps to the maximum, have no fast pipes.
-        let behind = |depth: i32| (depth as u32).wrapping_sub(1);
-        let (mut greatest, mut shallowest) = ([0; STRIP], [u32::MAX; STRIP]);
+        // Maps dry columns, which have no fast pipes, to the maximum.
+        let less_one = |depth: i32| (depth as u32).wrapping_sub(1);
+        let (mut max_flux, mut min_depth) = ([0; STRIP], [u32::MAX; STRIP]);
         for at in 0..self.strips() {
             let Strip { depth, south_depth, flux: [east, south], .. } = self.strip(at);
             for x in 0..STRIP {
                 // Positive floats order like their bits, and a maximum of integers vectorises.
                 let [east, south] = [east[x], south[x]].map(|flux| flux.abs().to_bits() as i32);
-                greatest[x] = greatest[x].max(east.max(south));
-                shallowest[x] = shallowest[x].min(behind(depth[x]).min(behind(south_depth[x])));
+                max_flux[x] = max_flux[x].max(east.max(south));
+                min_depth[x] = min_depth[x].min(less_one(depth[x]).min(less_one(south_depth[x])));
             }
         }
-        let last = behind(self.depth[self.flux[0].len()]);
-        let shallowest = shallowest.into_iter().fold(last, u32::min) as f32 + 1.0;
-        let greatest = greatest.into_iter().fold(0, i32::max);
-        is_fast(drive, [shallowest; 2], f32::from_bits(greatest as u32))
+        let last = less_one(self.depth[self.flux[0].len()]);
+        let min_depth = min_depth.into_iter().fold(last, u32::min) as f32 + 1.0;
+        let max_flux = max_flux.into_iter().fold(0, i32::max);
+        is_fast(drive, [min_depth; 2], f32::from_bits(max_flux as u32))
     }
 
-    /// Whether one of its pipes is fast; with `WAYS`, also whether a disturbance in one of those travels further than a cell in `step`
+    /// Whether one of its pipes is fast; with `TRAVEL`, also whether a disturbance in one of those travels further than a cell in `step`
     /// times the last step.
     #[inline(always)]
-    fn find<const WAYS: bool>(&self, drive: f32, step: f32) -> [bool; 2] {
+    fn find<const TRAVEL: bool>(&self, drive: f32, step: f32) -> [bool; 2] {
         let (mut any, mut farther) = ([0; STRIP], [0; STRIP]);
         for at in 0..self.strips() {
             let Strip { depth, east_depth, south_depth, flux: [east, south] } = self.strip(at);
@@ -228,9 +228,9 @@ impl<'a> Span<'a> {
                 for (depth, flux) in [([own, to_east], east[x]), ([own, to_south], south[x])] {
                     let is_fast = i32::from(is_fast(drive, depth, flux));
                     any[x] |= is_fast;
-                    if WAYS {
-                        let giver = if flux > 0.0 { depth[0] } else { depth[1] };
-                        farther[x] |= is_fast & i32::from(3.0 * step * flux.abs() > giver);
+                    if TRAVEL {
+                        let donor = if flux > 0.0 { depth[0] } else { depth[1] };
+                        farther[x] |= is_fast & i32::from(3.0 * step * flux.abs() > donor);
                     }
                 }
             }
@@ -250,8 +250,8 @@ fn is_fast(drive: f32, depth: [f32; 2], flux: f32) -> bool {
 #[inline(always)]
 fn light_of(drive: f32, step: &Step, depth: [f32; 2], flux: f32) -> f32 {
     let section = min(0.5 * (depth[0] + depth[1]), step.section);
-    let light = min(step.lighter / max(section, 1.0), LIGHTEST);
-    if is_fast(drive, depth, flux) { max(light, HEAVIEST) } else { 1.0 }
+    let light = min(step.light_depth / max(section, 1.0), MAX_LIGHT);
+    if is_fast(drive, depth, flux) { max(light, MIN_LIGHT) } else { 1.0 }
 }
 
 /// As `light_of`, for a link: its flux refers to the last step, which is about as long as this one.

@@ -13,7 +13,7 @@ pub struct LinkFlow {
     /// Flux (units a step).
     pub flux: Vec<f32>,
     /// Remainder of the transfer (units).
-    pub left: Vec<f32>,
+    pub remainder: Vec<f32>,
     /// Transfer in this step (units).
     pub transfer: Vec<f32>,
     /// Amounts of each scalar that fell freely over each link in the last step.
@@ -28,21 +28,21 @@ impl LinkFlow {
     /// No flow.
     pub fn new(links: &Links) -> Self {
         let none = vec![0.0; links.len()];
-        Self { flux: none.clone(), left: none.clone(), transfer: none, ..Self::default() }
+        Self { flux: none.clone(), remainder: none.clone(), transfer: none, ..Self::default() }
     }
 
     /// Sets the count of scalars of liquid that falls freely.
-    pub(super) fn carry(&mut self, scalars: usize) {
+    pub(super) fn set_scalar_count(&mut self, scalars: usize) {
         for (at, fallen) in self.fallen.iter_mut().enumerate() {
             *fallen = vec![0.0; if at < scalars { self.flux.len() } else { 0 }];
         }
     }
 
     /// Replaces a range of links by others with these fluxes and remainders.
-    pub fn replace(&mut self, part: Range<usize>, flux: &[f32], left: &[f32], scalars: usize) {
-        debug_assert_eq!(flux.len(), left.len());
+    pub fn replace(&mut self, part: Range<usize>, flux: &[f32], remainder: &[f32], scalars: usize) {
+        debug_assert_eq!(flux.len(), remainder.len());
         self.flux.splice(part.clone(), flux.iter().copied());
-        self.left.splice(part.clone(), left.iter().copied());
+        self.remainder.splice(part.clone(), remainder.iter().copied());
         self.transfer.splice(part.clone(), repeat_n(0.0, flux.len()));
         for fallen in self.fallen.iter_mut().take(scalars) {
             fallen.splice(part.clone(), repeat_n(0.0, flux.len()));

@@ -4,14 +4,14 @@ use std::ops::Range;
 
 use super::fast_films;
 use super::link_flow::beyond;
-use super::overflow_edges::{Fall, OverflowEdges, edge};
+use super::overflow_edges::{Fall, OverflowEdges, edge_drop};
 use super::rows::band_views::LinkPart;
-use super::viscous_flux::{Kind, Step, flux_of, min, split};
+use super::viscous_flux::{Step, StepKind, flux_of, min, whole_and_remainder};
 use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::pipes::Links;
 
 /// Clamp on transfers, beyond any column's depth (units): their sums fit 64 bits.
-const MOST: f32 = 2.1e9;
+const MAX_TRANSFER: f32 = 2.1e9;
 
 /// Units that crossed the border of the domain.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -35,7 +35,7 @@ pub struct RowLinks<'a> {
 
 impl RowLinks<'_> {
     /// The column that gives (or receives) a transfer through a link, if any.
-    fn end(&self, link: usize, transfer: f32, gives: bool) -> Option<u32> {
+    fn end_column(&self, link: usize, transfer: f32, gives: bool) -> Option<u32> {
         let column = if (transfer > 0.0) == gives { self.links.from[link] } else { self.links.to[link] };
         let is_there = column != NONE && (gives || self.overflow_edges.at(link) == Fall::No);
         (transfer != 0.0 && is_there).then_some(column)
@@ -44,7 +44,7 @@ impl RowLinks<'_> {
 
 impl LinkPart<'_> {
     /// Computes the flux and the transfer of the links that a row owns; `depth` gives H of columns of this row and the next one.
-    pub fn drive<K: Kind>(
+    pub fn find_fluxes<K: StepKind>(
         &mut self,
         step: &Step,
         columns: &Columns,
@@ -57,15 +57,15 @@ impl LinkPart<'_> {
             let own = depth(i);
             let at = link - self.first;
             let (eta, beyond, is_still) = match links.to[link] {
-                // Whatever lies below, as into the void.
-                _ if overflow_edges.at(link) == Fall::Ahead => (base[i] - edge(columns), 0, false),
+                // The surface below does not matter: it falls as into the void.
+                _ if overflow_edges.at(link) == Fall::Ahead => (base[i] - edge_drop(columns), 0, false),
                 j if overflow_edges.at(link) == Fall::Back => {
                     let (base, depth) = (base[j as usize], depth(j as usize));
-                    let (fall, depth) = (base + depth - (base - edge(columns)), [depth as f32, 0.0]);
+                    let (fall, depth) = (base + depth - (base - edge_drop(columns)), [depth as f32, 0.0]);
                     self.set_flux(at, 0.0 - driven::<K>(step, fall, depth, -self.flux[at], open));
                     continue;
                 }
-                NONE => beyond(links, columns, link, step.still),
+                NONE => beyond(links, columns, link, step.still_level),
                 j => (base[j as usize] + depth(j as usize), depth(j as usize), false),
             };
             let fall = (base[i] + own).saturating_sub(eta);
@@ -82,16 +82,24 @@ impl LinkPart<'_> {
     /// Sets the flux of a link of the part, and its transfer.
     fn set_flux(&mut self, at: usize, flux: f32) {
         self.flux[at] = flux;
-        let [transfer, left] = split(flux, self.left[at]);
-        (self.transfer[at], self.left[at]) = (transfer.clamp(-MOST, MOST), left);
+        let [transfer, remainder] = whole_and_remainder(flux, self.remainder[at]);
+        (self.transfer[at], self.remainder[at]) = (transfer.clamp(-MAX_TRANSFER, MAX_TRANSFER), remainder);
     }
 
-    /// Calls `add` with each column that gives (or receives) through a link of a row, and how much (units, rounded up to integers, so that
-    /// sums do not depend on their order).
-    pub fn each(&self, of: RowLinks, within: &Range<u32>, gives: bool, mut add: impl FnMut(u32, i64)) {
+    /// Calls `add` with each column of `within` that gives (or receives) through a link of a row, and how much (units, rounded up to
+    /// integers, so that sums do not depend on their order).
+    pub fn for_each_end(
+        &self,
+        of: RowLinks,
+        within: &Range<u32>,
+        gives: bool,
+        mut add: impl FnMut(u32, i64),
+    ) {
         for link in of.links.row(of.row) {
             let transfer = self.transfer[link - self.first];
-            if let Some(column) = of.end(link, transfer, gives).filter(|column| within.contains(column)) {
+            if let Some(column) =
+                of.end_column(link, transfer, gives).filter(|column| within.contains(column))
+            {
                 add(column, transfer.abs().ceil() as i64);
             }
         }
@@ -101,7 +109,7 @@ impl LinkPart<'_> {
     pub fn scale(&mut self, of: RowLinks, gives: bool, factor: impl Fn(u32) -> f32) {
         for link in of.links.row(of.row) {
             let at = link - self.first;
-            if let Some(k) = of.end(link, self.transfer[at], gives).map(&factor) {
+            if let Some(k) = of.end_column(link, self.transfer[at], gives).map(&factor) {
                 self.transfer[at] *= k;
                 self.flux[at] *= k;
             }
@@ -140,16 +148,20 @@ impl LinkPart<'_> {
 }
 
 /// The flux that the next step drives through a link (units a step), given the surface drop and both depths (units).
-fn driven<K: Kind>(step: &Step, fall: i32, depth: [f32; 2], flux: f32, open: f32) -> f32 {
+fn driven<K: StepKind>(step: &Step, fall: i32, depth: [f32; 2], flux: f32, open: f32) -> f32 {
     let light = if K::VISCOUS && !K::WHOLE { fast_films::light(step, depth, flux) } else { 1.0 };
-    step.rested::<K>(fall, depth, flux_of::<K>(step, fall, depth, flux, open, light))
+    step.rest_if_slow::<K>(fall, depth, flux_of::<K>(step, fall, depth, flux, open, light))
 }
 
 /// The flux of a wave that leaves over the border (units a step): a surface that is `fall` above the one at rest flows out at the speed of
 /// waves (Sommerfeld's condition), and waves are not reflected.
 fn radiated(step: &Step, fall: i32, depth: [f32; 2]) -> f32 {
     let mean = if step.is_whole { step.section } else { min(0.5 * (depth[0] + depth[1]), step.section) };
-    if fall.saturating_abs() <= step.level { 0.0 } else { min(step.wave * mean.sqrt(), 1.0) * fall as f32 }
+    if fall.saturating_abs() <= step.rest_drop {
+        0.0
+    } else {
+        min(step.wave * mean.sqrt(), 1.0) * fall as f32
+    }
 }
 
 /// The indices of a row's columns.

@@ -34,11 +34,11 @@ pub(super) use crate::shallow::solver::full::SLACK;
 use crate::shallow::solver::link_flow::LinkFlow;
 use active::Active;
 use fast_films::{Fast, Films};
-use lateral_friction::{Liquid, Walls};
+use lateral_friction::{LateralFriction, Liquid};
 use overflow_edges::OverflowEdges;
 use pressurised::network::{Network, State};
-use rest::{Bounds, Still};
-use rows::Ground;
+use rest::{Bounds, RestSearch};
+use rows::StepInputs;
 use rows::band_views::Part;
 use rows::bands::Bands;
 use stop::Stop;
@@ -52,7 +52,7 @@ pub struct Flow {
     /// Flux to the east and to the south (units in a step of `last`).
     pub(super) flux: [PerColumn<f32>; 2],
     /// Remainders of transfers to the east and to the south (units).
-    pub(super) left: [PerColumn<f32>; 2],
+    pub(super) remainder: [PerColumn<f32>; 2],
     pub(super) links: LinkFlow,
     pub(super) overflow_edges: OverflowEdges,
     active: Active,
@@ -63,7 +63,7 @@ pub struct Flow {
     pub(super) last: f64,
     pub(super) fast: Fast,
     /// Lateral friction of pipes.
-    pub(super) walls: Walls,
+    pub(super) friction: LateralFriction,
     /// Amounts of scalars.
     pub(super) amounts: Amounts,
     /// Whether sleeping is disabled, to compare results with and without it.
@@ -114,15 +114,15 @@ impl Flow {
         Self {
             depth: PerColumn::new(Array::Depth, columns.len() + STRIP, 0),
             flux: [none(Array::FluxEast), none(Array::FluxSouth)],
-            left: [none(Array::LeftEast), none(Array::LeftSouth)],
+            remainder: [none(Array::RemainderEast), none(Array::RemainderSouth)],
             links: LinkFlow::new(&pipes.links),
             overflow_edges: OverflowEdges::default(),
             active: Active::new(columns, &pipes.links),
-            bands: Bands::new(columns, pipes.links.most),
+            bands: Bands::new(columns, pipes.links.max_pipes),
             network: Network::new(columns.len(), columns.grid.size[1]),
             last: 1.0,
             fast: Fast::new(columns.len() + STRIP, columns.grid.size[1]),
-            walls: Walls::default(),
+            friction: LateralFriction::default(),
             amounts: Amounts::none(),
             is_sleepless: false,
         }
@@ -130,8 +130,8 @@ impl Flow {
 
     /// Memory (bytes).
     pub fn bytes(&self) -> usize {
-        let pipes: usize = self.flux.iter().chain(&self.left).map(PerColumn::bytes).sum();
-        let links = [&self.links.flux, &self.links.left, &self.links.transfer];
+        let pipes: usize = self.flux.iter().chain(&self.remainder).map(PerColumn::bytes).sum();
+        let links = [&self.links.flux, &self.links.remainder, &self.links.transfer];
         let links: usize = links.iter().map(|numbers| size_of_val(&numbers[..])).sum();
         self.depth.bytes()
             + pipes
@@ -140,7 +140,7 @@ impl Flow {
             + self.bands.bytes()
             + self.network.bytes()
             + self.fast.bytes()
-            + self.walls.bytes()
+            + self.friction.bytes()
             + self.amounts.bytes()
     }
 
@@ -156,18 +156,18 @@ impl Flow {
 
     /// Fluxes (units in a step of `last`) and remainders of transfers (units), each to the east and to the south, by column index.
     pub(super) fn numbers(&self) -> [&[f32]; 4] {
-        let ([east, south], [left_east, left_south]) = (&self.flux, &self.left);
-        [east, south, left_east, left_south]
+        let ([east, south], [remainder_east, remainder_south]) = (&self.flux, &self.remainder);
+        [east, south, remainder_east, remainder_south]
     }
 
     /// All parts that a restored state replaces; [`Flow::wake`] must follow.
     pub(super) fn stored(&mut self) -> Stored<'_> {
-        let ([east, south], [left_east, left_south]) = (&mut self.flux, &mut self.left);
+        let ([east, south], [remainder_east, remainder_south]) = (&mut self.flux, &mut self.remainder);
         Stored {
             active: &self.active.active,
             depth: &mut self.depth,
-            numbers: [east, south, left_east, left_south],
-            heads: self.network.over_mut(),
+            numbers: [east, south, remainder_east, remainder_south],
+            heads: self.network.excess_heads_mut(),
             bands: &mut self.bands,
             links: &mut self.links,
             last: &mut self.last,
@@ -187,11 +187,11 @@ impl Flow {
     }
 
     /// Replaces the scalars; all amounts are 0.
-    pub(super) fn carry(&mut self, columns: &Columns, amounts: Amounts) {
-        self.bands.carry(columns, amounts.count());
-        self.links.carry(amounts.count());
+    pub(super) fn set_scalars(&mut self, columns: &Columns, amounts: Amounts) {
+        self.bands.set_scalar_count(columns, amounts.count());
+        self.links.set_scalar_count(amounts.count());
         self.amounts = amounts;
-        self.active.rouse_all();
+        self.active.wake_all();
     }
 
     /// As [`Flow::change_depth`]; added liquid has these concentrations, removed liquid takes its scalars along.
@@ -228,7 +228,7 @@ impl Flow {
     /// Changes the number of indices in the range `part` to `len`; the values in this range are then unspecified.
     pub(super) fn resize_part(&mut self, part: Range<usize>, len: usize) {
         self.depth.resize_part(part.clone(), len, 0);
-        for numbers in self.flux.iter_mut().chain(&mut self.left) {
+        for numbers in self.flux.iter_mut().chain(&mut self.remainder) {
             numbers.resize_part(part.clone(), len, 0.0);
         }
         self.amounts.resize_part(part.clone(), len);
@@ -244,62 +244,63 @@ impl Flow {
         rows: Range<usize>,
         has_same_links: bool,
     ) {
-        self.bands.refit(columns, pipes.links.most, rows.clone(), &self.depth);
-        self.walls.fit(columns);
+        self.bands.refit(columns, pipes.links.max_pipes, rows.clone(), &self.depth);
+        self.friction.fit(columns);
         let links = (!has_same_links).then_some(&pipes.links);
         self.active.refit(columns, links, rows.clone(), &self.depth);
-        let Self { flux, left, network, active, .. } = self;
+        let Self { flux, remainder, network, active, .. } = self;
         for strip in columns.row(rows.start).start..columns.row(rows.end - 1).end {
             if !active.active[strip] {
-                flux.iter_mut().chain(&mut *left).for_each(|flow| strip_mut(flow, strip).fill(0.0));
-                network.dry(strip * STRIP..(strip + 1) * STRIP);
+                flux.iter_mut().chain(&mut *remainder).for_each(|flow| strip_mut(flow, strip).fill(0.0));
+                network.clear_heads(strip * STRIP..(strip + 1) * STRIP);
             }
         }
     }
 
     /// Begins a frame: deactivates strips where all is dry, and lets those at rest sleep.
     pub fn begin_frame(&mut self, columns: &Columns, pipes: &Pipes, bounds: Bounds) {
-        self.walls.begin_frame();
+        self.friction.begin_frame();
         let [east, south] = &mut self.flux;
-        let [left_east, left_south] = &mut self.left;
-        self.active.settle(columns, &self.depth, |dry| {
-            for numbers in [&mut *east, &mut *south, &mut *left_east, &mut *left_south] {
+        let [remainder_east, remainder_south] = &mut self.remainder;
+        self.active.deactivate_dry(columns, &self.depth, |dry| {
+            for numbers in [&mut *east, &mut *south, &mut *remainder_east, &mut *remainder_south] {
                 numbers[dry.clone()].fill(0.0);
             }
-            self.network.dry(dry);
+            self.network.clear_heads(dry);
         });
         let Self { depth, links, network, active, .. } = self;
-        let numbers = [&**east, south, left_east, left_south];
-        let still = Still { columns, pipes, depth, numbers, links, heads: network.over(), bounds };
-        if bounds.level > 0 && !self.is_sleepless && !self.amounts.has_laws() {
-            active.fall_asleep(&still);
+        let numbers = [&**east, south, remainder_east, remainder_south];
+        let search =
+            RestSearch { columns, pipes, depth, numbers, links, heads: network.excess_heads(), bounds };
+        if bounds.rest_drop > 0 && !self.is_sleepless && !self.amounts.has_laws() {
+            active.fall_asleep(&search);
         }
     }
 
     /// Wakes all strips: something other than the liquid has changed.
-    pub fn rouse(&mut self) {
-        self.active.rouse_all();
+    pub fn wake_all(&mut self) {
+        self.active.wake_all();
     }
 
     /// Sets whether sleeping is disabled.
     pub fn set_sleepless(&mut self, is_sleepless: bool) {
         self.is_sleepless = is_sleepless;
-        self.active.rouse_all();
+        self.active.wake_all();
     }
 
     /// Finds fast films. Returns a count of cells, a power of two: the smallest that no disturbance in them exceeds during `step` times the
-    /// last step, or `farthest` if that is less. g unit dt^2 / dx^2 of the last step is `drive` (1 / units).
-    pub fn find_fast(&mut self, columns: &Columns, drive: f64, step: f64, farthest: u32) -> u32 {
+    /// last step, or `max_cells` if that is less. g unit dt^2 / dx^2 of the last step is `drive` (1 / units).
+    pub fn find_fast_films(&mut self, columns: &Columns, drive: f64, step: f64, max_cells: u32) -> u32 {
         self.active.refresh(columns, &self.depth);
         let Self { fast, active, depth, flux: [east, south], .. } = self;
         let films = Films { active, depth, flux: [east, south], drive: drive as f32 };
-        fast.find(&films, step as f32, farthest)
+        fast.find(&films, step as f32, max_cells)
     }
 
     /// Reduces the inertia of fast films for steps like `step`.
-    pub fn lighten(&mut self, drive: f64, step: &Step) {
+    pub fn reduce_inertia(&mut self, drive: f64, step: &Step) {
         let Self { fast, active, depth, flux: [east, south], .. } = self;
-        fast.lighten(&Films { active, depth, flux: [east, south], drive: drive as f32 }, step);
+        fast.reduce_inertia(&Films { active, depth, flux: [east, south], drive: drive as f32 }, step);
     }
 
     /// Finds the overflow edges of the next step: the links that liquid falls freely from.
@@ -316,52 +317,57 @@ impl Flow {
             self.last = dt;
             return [0; 3];
         }
-        self.walls.begin_step(step, &pipes.links, columns, self.bands.row_depths());
+        self.friction.begin_step(step, &pipes.links, columns, self.bands.row_depths());
         if self.bands.find_filling() || !self.network.is_empty() {
-            self.flood(columns, pipes, step, stop);
+            self.solve_network(columns, pipes, step, stop);
             for strip in self.network.strips() {
                 self.active.stir(columns, strip);
             }
             self.active.refresh(columns, &self.depth);
         }
-        self.rub(columns, pipes, step);
+        self.solve_lateral_friction(columns, pipes, step);
         self.amounts.begin_step(dt);
         if !self.network.is_empty() {
-            self.carry_flooded();
+            self.move_network_scalars();
         }
         let law_effects = self.amounts.law_effects();
-        let ground = Ground {
+        let inputs = StepInputs {
             columns,
             pipes,
             active: &self.active,
             network: &self.network,
             fast: &self.fast,
-            walls: &self.walls,
+            friction: &self.friction,
             overflow_edges: &self.overflow_edges,
-            may_rest: step.level > 0,
+            may_rest: step.rest_drop > 0,
             may_fill: &[],
             room: &[],
             law_effects: &law_effects,
         };
-        let [flux, left] =
-            [&mut self.flux, &mut self.left].map(|both| both.each_mut().map(|numbers| &mut numbers[..]));
+        let [flux, remainder] =
+            [&mut self.flux, &mut self.remainder].map(|both| both.each_mut().map(|numbers| &mut numbers[..]));
         let amounts = self.amounts.amounts.each_mut().map(|amounts| &mut amounts[..]);
-        let liquid = Part::new(&mut self.depth, flux, left, &mut self.links, amounts);
-        self.bands.step(step, &ground, liquid);
-        self.network.put_back(&mut self.flux, &mut self.left, &mut self.links, &mut self.overflow_edges);
+        let liquid = Part::new(&mut self.depth, flux, remainder, &mut self.links, amounts);
+        self.bands.step(step, &inputs, liquid);
+        self.network.store_fluxes(
+            &mut self.flux,
+            &mut self.remainder,
+            &mut self.links,
+            &mut self.overflow_edges,
+        );
         let mut scaled = [0; 3];
-        for stepped in self.bands.results() {
-            scaled = [0, 1, 2].map(|which| scaled[which] + stepped.scaled[which]);
-            self.links.lost += stepped.outside.lost;
-            self.links.gained += stepped.outside.gained;
-            for strip in stepped.woken.drain(..) {
+        for results in self.bands.results() {
+            scaled = [0, 1, 2].map(|which| scaled[which] + results.scaled[which]);
+            self.links.lost += results.outside.lost;
+            self.links.gained += results.outside.gained;
+            for strip in results.woken.drain(..) {
                 self.active.wake(columns, strip as usize);
             }
-            self.amounts.settle(&stepped.carried);
-            (stepped.scaled, stepped.outside, stepped.carried) = Default::default();
+            self.amounts.settle(&results.scalar_changes);
+            (results.scaled, results.outside, results.scalar_changes) = Default::default();
         }
         if self.active.any_asleep {
-            self.stir(columns, &pipes.links);
+            self.wake_linked(columns, &pipes.links);
         }
         self.last = dt;
         scaled
@@ -370,11 +376,11 @@ impl Flow {
     /// Divides steps among this many threads, if that is faster; returns whether it is.
     pub fn divide(&mut self, columns: &Columns, threads: usize) -> bool {
         self.bands.divide(columns, threads);
-        self.bands.are_several()
+        self.bands.is_divided()
     }
 
     /// Wakes strips between which the step's links moved liquid.
-    fn stir(&mut self, columns: &Columns, links: &Links) {
+    fn wake_linked(&mut self, columns: &Columns, links: &Links) {
         for link in (0..links.len()).filter(|&link| self.links.transfer[link] != 0.0) {
             for end in [links.from[link], links.to[link]].into_iter().filter(|&end| end != NONE) {
                 self.active.stir(columns, end as usize / STRIP);
@@ -383,12 +389,18 @@ impl Flow {
     }
 
     /// Moves the scalars of transfers between full columns.
-    fn carry_flooded(&mut self) {
+    fn move_network_scalars(&mut self) {
         let Amounts { amounts, party_levels, scalars, .. } = &mut self.amounts;
         let mut changes = [Changes::default(); MAX_SCALARS];
         let each = amounts.iter_mut().zip(&mut self.links.fallen).zip(&mut changes);
         for ((amounts, fallen), changes) in each.take(scalars.len()) {
-            self.network.carry(&self.depth, (&self.overflow_edges, fallen), amounts, party_levels, changes);
+            self.network.move_scalars(
+                &self.depth,
+                (&self.overflow_edges, fallen),
+                amounts,
+                party_levels,
+                changes,
+            );
         }
         self.amounts.settle(&changes);
     }
@@ -405,8 +417,8 @@ impl Flow {
         [wet, full.min(wet).max(self.network.len())]
     }
 
-    /// Computes the fluxes with lateral friction.
-    fn rub(&mut self, columns: &Columns, pipes: &Pipes, step: &Step) {
+    /// Solves for the fluxes of pipes with lateral friction.
+    fn solve_lateral_friction(&mut self, columns: &Columns, pipes: &Pipes, step: &Step) {
         let [east, south] = &self.flux;
         let liquid = Liquid {
             columns,
@@ -417,24 +429,24 @@ impl Flow {
             depth: &self.depth,
             flux: [east, south],
             row_depths: self.bands.row_depths(),
-            is_divided: self.bands.are_several(),
+            is_divided: self.bands.is_divided(),
         };
-        self.walls.find(step, &liquid);
+        self.friction.find(step, &liquid);
     }
 
     /// Computes the flow through full columns.
-    fn flood(&mut self, columns: &Columns, pipes: &Pipes, step: &Step, stop: &Stop) {
-        let ([east, south], [left_east, left_south]) = (&self.flux, &self.left);
+    fn solve_network(&mut self, columns: &Columns, pipes: &Pipes, step: &Step, stop: &Stop) {
+        let ([east, south], [remainder_east, remainder_south]) = (&self.flux, &self.remainder);
         let state = State {
             step,
             columns,
             pipes,
             depth: &self.depth,
             flux: [east, south],
-            left: [left_east, left_south],
+            remainder: [remainder_east, remainder_south],
             links: &self.links,
             overflow_edges: &self.overflow_edges,
-            walls: &self.walls,
+            friction: &self.friction,
         };
         self.network.find(self.bands.filling(), &state, stop);
     }

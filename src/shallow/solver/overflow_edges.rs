@@ -31,7 +31,7 @@ pub struct OverflowEdges {
 
 /// Liquid that went over an overflow edge in a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Over {
+pub struct Overflow {
     /// The link.
     pub link: usize,
     /// The donor, and the column below; [`NONE`]: the void.
@@ -81,7 +81,11 @@ impl OverflowEdges {
     }
 
     /// The liquid that went over the overflow edges in a step, in their order.
-    pub fn over<'a>(&'a self, links: &'a Links, flow: &'a LinkFlow) -> impl Iterator<Item = Over> + 'a {
+    pub fn overflow<'a>(
+        &'a self,
+        links: &'a Links,
+        flow: &'a LinkFlow,
+    ) -> impl Iterator<Item = Overflow> + 'a {
         let overflow_edges = (0..self.falls.len()).filter(|&link| self.falls[link] != Fall::No);
         overflow_edges.filter_map(move |link| {
             let units = i64::from(flow.transfer[link].abs() as i32) + self.flooded[link];
@@ -89,13 +93,13 @@ impl OverflowEdges {
                 Fall::Back => (links.to[link], links.from[link]),
                 _ => (links.from[link], links.to[link]),
             };
-            (units > 0).then(|| Over { link, from, to, units, depth: self.depth[link] })
+            (units > 0).then(|| Overflow { link, from, to, units, depth: self.depth[link] })
         })
     }
 }
 
 /// Surface drop assumed where the ground beyond does not count: the edge of a cell (units).
-pub(super) fn edge(columns: &Columns) -> i32 {
+pub(super) fn edge_drop(columns: &Columns) -> i32 {
     (columns.grid.cell / columns.heights.unit).min(f64::from(i32::MAX / 2)) as i32
 }
 

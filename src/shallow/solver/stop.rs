@@ -16,7 +16,7 @@ impl<'a> Stop<'a> {
     }
 
     /// Whether to stop.
-    pub fn is_asked(&self) -> bool {
+    pub fn is_requested(&self) -> bool {
         self.0.is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 }

@@ -17,9 +17,9 @@ pub struct Step {
     pub drag: f32,
     /// [`FAST_WAVES`](super::fast_films::FAST_WAVES) divided by `drive` (units). This over a depth is the factor by which the inertia of a
     /// fast film is reduced.
-    pub lighter: f32,
+    pub light_depth: f32,
     /// The maximum transfer of a pipe of a fast film in a step, as a fraction of the donor's depth.
-    pub fastest: f32,
+    pub max_film_transfer: f32,
     /// Upper limit of H in the section A = dx H (units), for stability; with whole sections (A = dx^2, as in the thesis) it is dx.
     pub section: f32,
     /// Whether all sections are dx^2.
@@ -27,7 +27,7 @@ pub struct Step {
     /// The shear-thinning law; None: constant viscosity.
     pub thinning: Option<Thinning>,
     /// Surface of the liquid at rest beyond the border (units), or BOTTOMLESS: there is none.
-    pub still: i32,
+    pub still_level: i32,
     /// dt (g unit)^1/2 / dx: multiplied by the square root of a depth (units), it gives the distance (cells) that a wave travels in a step.
     pub wave: f32,
     /// What gravity adds to the drop of the surface over a cell, along x and along z (units).
@@ -35,14 +35,14 @@ pub struct Step {
     /// 6/5 nu dt / dx^2: lateral friction (`lateral_friction`); 0: there is none.
     pub lateral: f32,
     /// The length of this step divided by that of the last one, which stored fluxes refer to.
-    pub again: f32,
+    pub step_ratio: f32,
     /// Edge of a cell (units).
     pub cell: f32,
     /// Maximum surface difference (units) at which the liquid in a pipe comes to rest.
-    pub level: i32,
-    /// Maximum flux at which the liquid in a pipe comes to rest, as a fraction of the depth in its section. Below this and `level` no
-    /// motion is visible.
-    pub slow: f32,
+    pub rest_drop: i32,
+    /// Maximum flux at which the liquid in a pipe comes to rest, as a fraction of the depth in its section. Below this and
+    /// `rest_drop` no motion is visible.
+    pub rest_flux: f32,
 }
 
 /// Carreau's law, as a function of a flux and the donor's depth.
@@ -58,7 +58,7 @@ pub struct Thinning {
 }
 
 /// Compile-time variants of a step: selected once a step, not for each pipe.
-pub trait Kind {
+pub trait StepKind {
     /// Whether there is viscosity.
     const VISCOUS: bool;
     /// Whether A is dx^2.
@@ -68,9 +68,9 @@ pub trait Kind {
 }
 
 /// A variant, by three independent flags: viscous or not, whole sections or not, shear-thinning or not.
-pub struct Of<const VISCOUS: bool, const WHOLE: bool, const THINS: bool>;
+pub struct Variant<const VISCOUS: bool, const WHOLE: bool, const THINS: bool>;
 
-impl<const VISCOUS: bool, const WHOLE: bool, const THINS: bool> Kind for Of<VISCOUS, WHOLE, THINS> {
+impl<const VISCOUS: bool, const WHOLE: bool, const THINS: bool> StepKind for Variant<VISCOUS, WHOLE, THINS> {
     const VISCOUS: bool = VISCOUS;
     const WHOLE: bool = WHOLE;
     const THINS: bool = THINS;
@@ -85,7 +85,7 @@ macro_rules! by_kind {
     ($step:expr, $kind:ident => $run:expr; $($viscous:literal $whole:literal $thins:literal),+) => {
         match ($step.drag > 0.0, $step.is_whole, $step.drag > 0.0 && $step.thinning.is_some()) {
             $(($viscous, $whole, $thins) => {
-                type $kind = $crate::shallow::solver::viscous_flux::Of<$viscous, $whole, $thins>;
+                type $kind = $crate::shallow::solver::viscous_flux::Variant<$viscous, $whole, $thins>;
                 $run
             })+
             (false, _, true) => unreachable!("only viscosity thins"),
@@ -109,8 +109,8 @@ pub fn min(a: f32, b: f32) -> f32 {
 /// The transfer of a pipe (units), which is its flux plus the remainder of earlier transfers, rounded to nearest; and the new remainder. If
 /// it were truncated toward zero, the remainder would keep driving in the direction of the flux. A pipe without flux keeps no remainder.
 #[inline(always)]
-pub fn split(flux: f32, left: f32) -> [f32; 2] {
-    let asked = if flux == 0.0 { 0.0 } else { flux + left };
+pub fn whole_and_remainder(flux: f32, remainder: f32) -> [f32; 2] {
+    let asked = if flux == 0.0 { 0.0 } else { flux + remainder };
     let whole = asked.round_ties_even();
     [whole, asked - whole]
 }
@@ -118,42 +118,52 @@ pub fn split(flux: f32, left: f32) -> [f32; 2] {
 /// The flux through a pipe from i to j after a step (units of depth): `fall` is eta_i - eta_j, `depth` H of both (units), `flux` the last
 /// flux; `light` is the factor by which the liquid's inertia is reduced.
 #[inline(always)]
-pub fn flux_of<K: Kind>(step: &Step, fall: i32, depth: [f32; 2], flux: f32, open: f32, light: f32) -> f32 {
+pub fn flux_of<K: StepKind>(
+    step: &Step,
+    fall: i32,
+    depth: [f32; 2],
+    flux: f32,
+    open: f32,
+    light: f32,
+) -> f32 {
     let kept = step.kept * flux;
     let drive = step.drive * light * fall as f32;
     // The mean depth drives, the same uphill and downhill: with the donor's depth, waves would gain energy in each oscillation.
     let section = if K::WHOLE { step.section } else { min(0.5 * (depth[0] + depth[1]), step.section) };
     let driven = kept + drive * section;
-    let giver = if driven > 0.0 { depth[0] } else { depth[1] };
+    let donor = if driven > 0.0 { depth[0] } else { depth[1] };
     if K::VISCOUS {
-        let square = giver * giver;
+        let square = donor * donor;
         let drag = light * if K::THINS { step.drag * step.thinned(flux, square) } else { step.drag };
         let open = square * open;
         driven * (open / (open + drag))
     } else {
         // No drag, but a dry column gives nothing, and a closed pipe lets nothing pass.
-        if giver * open > 0.0 { driven } else { 0.0 }
+        if donor * open > 0.0 { driven } else { 0.0 }
     }
 }
 
 impl Step {
     /// Sets a flux to 0 where it is slow and the surface differs from level by less than is visible, so that the liquid can sleep.
     #[inline(always)]
-    pub fn rested<K: Kind>(&self, fall: i32, depth: [f32; 2], flux: f32) -> f32 {
+    pub fn rest_if_slow<K: StepKind>(&self, fall: i32, depth: [f32; 2], flux: f32) -> f32 {
         let section = if K::WHOLE { self.section } else { min(0.5 * (depth[0] + depth[1]), self.section) };
-        let moves = (fall.abs() > self.level) | (flux.abs() > self.slow * section);
+        let moves = (fall.abs() > self.rest_drop) | (flux.abs() > self.rest_flux * section);
         // Turns -0 into 0.
         if moves { flux + 0.0 } else { 0.0 }
     }
 
-    /// Limits the flux of a pipe whose inertia is reduced (`light` above 1) to a part of the donor's depth. Sets `held` where the limit
-    /// acts.
+    /// Limits the flux of a pipe whose inertia is reduced (`light` above 1) to a part of the donor's depth; sets `limited` if that
+    /// changes it.
     #[inline(always)]
-    fn held_back(&self, light: f32, depth: [f32; 2], flux: f32, held: &mut i32) -> f32 {
-        let most =
-            if light > 1.0 { self.fastest * if flux > 0.0 { depth[0] } else { depth[1] } } else { f32::MAX };
-        let within = min(max(flux, -most), most);
-        *held |= i32::from(within != flux);
+    fn limit_fast_film(&self, light: f32, depth: [f32; 2], flux: f32, limited: &mut i32) -> f32 {
+        let bound = if light > 1.0 {
+            self.max_film_transfer * if flux > 0.0 { depth[0] } else { depth[1] }
+        } else {
+            f32::MAX
+        };
+        let within = min(max(flux, -bound), bound);
+        *limited |= i32::from(within != flux);
         within
     }
 
@@ -209,11 +219,11 @@ pub struct Row<'a> {
 }
 
 /// State of a span's pipes, to the east and to the south.
-pub struct Carried<'a> {
+pub struct PipeState<'a> {
     /// Flux (units a step).
     pub flux: [&'a mut [f32]; 2],
     /// Remainders of transfers (units).
-    pub left: [&'a mut [f32]; 2],
+    pub remainder: [&'a mut [f32]; 2],
     /// Transfers of this step (units).
     pub transfer: [&'a mut [f32]; 2],
 }
@@ -221,14 +231,17 @@ pub struct Carried<'a> {
 /// Computes the fluxes and transfers of a span's pipes; returns whether one of a fast film was limited. With `RESTS`, slow liquid comes to
 /// rest.
 #[inline(always)]
-pub fn flux_row<K: Kind, const LIGHT: bool, const RESTS: bool>(
+pub fn flux_row<K: StepKind, const LIGHT: bool, const RESTS: bool>(
     step: &Step,
     row: &Row,
-    carried: Carried,
+    state: PipeState,
 ) -> bool {
-    let mut held = [0; STRIP];
-    let Carried { flux: [east, south], left: [left_east, left_south], transfer: [to_east, to_south] } =
-        carried;
+    let mut limited = [0; STRIP];
+    let PipeState {
+        flux: [east, south],
+        remainder: [remainder_east, remainder_south],
+        transfer: [to_east, to_south],
+    } = state;
     for strip in 0..east.len() / STRIP {
         let first = strip * STRIP;
         let base = strip_of(row.base, strip);
@@ -241,12 +254,12 @@ pub fn flux_row<K: Kind, const LIGHT: bool, const RESTS: bool>(
             open: strip_of(row.open[0], strip),
             light,
         };
-        let (flux, left, to) =
-            (strip_mut(east, strip), strip_mut(left_east, strip), strip_mut(to_east, strip));
+        let (flux, remainder, to) =
+            (strip_mut(east, strip), strip_mut(remainder_east, strip), strip_mut(to_east, strip));
         if is_light {
-            flux_strip::<K, true, RESTS, 0>(step, &ends, flux, left, to, &mut held);
+            flux_strip::<K, true, RESTS, 0>(step, &ends, flux, remainder, to, &mut limited);
         } else {
-            flux_strip::<K, false, RESTS, 0>(step, &ends, flux, left, to, &mut held);
+            flux_strip::<K, false, RESTS, 0>(step, &ends, flux, remainder, to, &mut limited);
         }
         let ends = Ends {
             base: [base, strip_of(row.south_base, strip)],
@@ -254,36 +267,57 @@ pub fn flux_row<K: Kind, const LIGHT: bool, const RESTS: bool>(
             open: strip_of(row.open[1], strip),
             light,
         };
-        let (flux, left, to) =
-            (strip_mut(south, strip), strip_mut(left_south, strip), strip_mut(to_south, strip));
+        let (flux, remainder, to) =
+            (strip_mut(south, strip), strip_mut(remainder_south, strip), strip_mut(to_south, strip));
         if is_light {
-            flux_strip::<K, true, RESTS, 1>(step, &ends, flux, left, to, &mut held);
+            flux_strip::<K, true, RESTS, 1>(step, &ends, flux, remainder, to, &mut limited);
         } else {
-            flux_strip::<K, false, RESTS, 1>(step, &ends, flux, left, to, &mut held);
+            flux_strip::<K, false, RESTS, 1>(step, &ends, flux, remainder, to, &mut limited);
         }
     }
-    LIGHT && held != [0; STRIP]
+    LIGHT && limited != [0; STRIP]
 }
 
 /// As [`flux_row`], for fluxes to the east and to the south that are already solved (`lateral_friction`).
 #[inline(always)]
-pub fn solved_row<const LIGHT: bool>(step: &Step, row: &Row, solved: [&[f32]; 2], carried: Carried) -> bool {
-    let mut held = [0; STRIP];
-    let Carried { flux: [east, south], left: [left_east, left_south], transfer: [to_east, to_south] } =
-        carried;
+pub fn solved_row<const LIGHT: bool>(step: &Step, row: &Row, solved: [&[f32]; 2], state: PipeState) -> bool {
+    let mut limited = [0; STRIP];
+    let PipeState {
+        flux: [east, south],
+        remainder: [remainder_east, remainder_south],
+        transfer: [to_east, to_south],
+    } = state;
     for strip in 0..east.len() / STRIP {
         let depth = strip_of(row.depth, strip);
         let light = if LIGHT { strip_of(row.light, strip) } else { &[0; STRIP] };
         let ends = [depth, strip_from(row.depth, strip * STRIP + 1)];
-        let (flux, left, to) =
-            (strip_mut(east, strip), strip_mut(left_east, strip), strip_mut(to_east, strip));
-        solved_strip::<LIGHT, 0>(step, ends, light, strip_of(solved[0], strip), flux, left, to, &mut held);
+        let (flux, remainder, to) =
+            (strip_mut(east, strip), strip_mut(remainder_east, strip), strip_mut(to_east, strip));
+        solved_strip::<LIGHT, 0>(
+            step,
+            ends,
+            light,
+            strip_of(solved[0], strip),
+            flux,
+            remainder,
+            to,
+            &mut limited,
+        );
         let ends = [depth, strip_of(row.south_depth, strip)];
-        let (flux, left, to) =
-            (strip_mut(south, strip), strip_mut(left_south, strip), strip_mut(to_south, strip));
-        solved_strip::<LIGHT, 1>(step, ends, light, strip_of(solved[1], strip), flux, left, to, &mut held);
+        let (flux, remainder, to) =
+            (strip_mut(south, strip), strip_mut(remainder_south, strip), strip_mut(to_south, strip));
+        solved_strip::<LIGHT, 1>(
+            step,
+            ends,
+            light,
+            strip_of(solved[1], strip),
+            flux,
+            remainder,
+            to,
+            &mut limited,
+        );
     }
-    LIGHT && held != [0; STRIP]
+    LIGHT && limited != [0; STRIP]
 }
 
 #[inline(always)]
@@ -294,18 +328,18 @@ fn solved_strip<const LIGHT: bool, const AXIS: usize>(
     light: &[u32; STRIP],
     solved: &[f32; STRIP],
     flux: &mut [f32; STRIP],
-    left: &mut [f32; STRIP],
+    remainder: &mut [f32; STRIP],
     transfer: &mut [f32; STRIP],
-    held: &mut [i32; STRIP],
+    limited: &mut [i32; STRIP],
 ) {
     for x in 0..STRIP {
         let mut f = solved[x];
         if LIGHT {
             let depth = [depth[0][x] as f32, depth[1][x] as f32];
-            f = step.held_back(unpacked(light[x])[AXIS], depth, f, &mut held[x]);
+            f = step.limit_fast_film(unpacked(light[x])[AXIS], depth, f, &mut limited[x]);
         }
         flux[x] = f;
-        [transfer[x], left[x]] = split(f, left[x]);
+        [transfer[x], remainder[x]] = whole_and_remainder(f, remainder[x]);
     }
 }
 
@@ -320,13 +354,13 @@ struct Ends<'a> {
 /// Fluxes of a strip's pipes to the east or to the south. A strip has a fixed length, and each array that changes is a separate argument:
 /// so the compiler emits neither overlap tests before a row nor a scalar loop at its end.
 #[inline(always)]
-fn flux_strip<K: Kind, const LIGHT: bool, const RESTS: bool, const AXIS: usize>(
+fn flux_strip<K: StepKind, const LIGHT: bool, const RESTS: bool, const AXIS: usize>(
     step: &Step,
     ends: &Ends,
     flux: &mut [f32; STRIP],
-    left: &mut [f32; STRIP],
+    remainder: &mut [f32; STRIP],
     transfer: &mut [f32; STRIP],
-    held: &mut [i32; STRIP],
+    limited: &mut [i32; STRIP],
 ) {
     let Ends { base, depth, open, light } = ends;
     for x in 0..STRIP {
@@ -335,13 +369,13 @@ fn flux_strip<K: Kind, const LIGHT: bool, const RESTS: bool, const AXIS: usize>(
         let light = if LIGHT { unpacked(light[x])[AXIS] } else { 1.0 };
         let mut f = flux_of::<K>(step, fall, depth, flux[x], open[x], light);
         if RESTS {
-            f = step.rested::<K>(fall, depth, f);
+            f = step.rest_if_slow::<K>(fall, depth, f);
         }
         if LIGHT {
-            f = step.held_back(light, depth, f, &mut held[x]);
+            f = step.limit_fast_film(light, depth, f, &mut limited[x]);
         }
         flux[x] = f;
-        [transfer[x], left[x]] = split(f, left[x]);
+        [transfer[x], remainder[x]] = whole_and_remainder(f, remainder[x]);
     }
 }
 
@@ -367,38 +401,45 @@ mod tests {
     }
 
     impl Step {
-        /// A step with all coefficients 0.
-        pub(in crate::shallow::solver) fn still() -> Self {
+        /// A step in which no force acts.
+        pub(in crate::shallow::solver) fn without_forces() -> Self {
             Self {
                 kept: 1.0,
                 drive: 0.0,
                 drag: 0.0,
-                lighter: 1.0,
-                fastest: 0.3,
+                light_depth: 1.0,
+                max_film_transfer: 0.3,
                 section: 1e9,
                 is_whole: false,
                 thinning: None,
-                still: 0,
+                still_level: 0,
                 wave: 0.0,
                 tilt: [0; 2],
                 lateral: 0.0,
-                again: 1.0,
+                step_ratio: 1.0,
                 cell: 1.0,
-                level: 4,
-                slow: 1e-9,
+                rest_drop: 4,
+                rest_flux: 1e-9,
             }
         }
     }
 
     #[test]
     fn a_flux_is_the_same_seen_from_both_ends() {
-        let step = Step { kept: 0.9, drive: 1e-7, drag: 1e9, lighter: 3.5e6, section: 5e4, ..Step::still() };
+        let step = Step {
+            kept: 0.9,
+            drive: 1e-7,
+            drag: 1e9,
+            light_depth: 3.5e6,
+            section: 5e4,
+            ..Step::without_forces()
+        };
         for (fall, depth, last) in
             [(700, [3e4, 2e4], 20.0), (-90, [6e4, 0.0], 31.5), (40, [2e4, 2e4], -0.1), (-5, [0.0, 1e4], 0.0)]
         {
             let [there, back] =
                 [(fall, depth, last), (-fall, [depth[1], depth[0]], -last)].map(|(fall, depth, last)| {
-                    flux_of::<Of<true, false, false>>(&step, fall, depth, last, 0.7, 1.5)
+                    flux_of::<Variant<true, false, false>>(&step, fall, depth, last, 0.7, 1.5)
                 });
             assert_eq!(there, -back, "{fall} {depth:?} {last}");
         }

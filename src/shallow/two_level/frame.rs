@@ -8,10 +8,10 @@ use crate::error::{Error, Result};
 use crate::numeric::cpu::FlushDenormals;
 use crate::shallow::Shallow;
 use crate::shallow::frame::{check_length, too_many_steps};
-use crate::shallow::solver::rows::bands::attended;
+use crate::shallow::solver::rows::bands::with_spinning_threads;
 use crate::shallow::solver::stop::Stop;
 use crate::shallow::system::Report;
-use crate::shallow::time_step::{self, MOST_STEPS};
+use crate::shallow::time_step::{self, MAX_STEPS};
 
 impl Detail {
     /// One frame of `dt` (s).
@@ -29,7 +29,7 @@ impl Detail {
         let divided =
             [&mut self.fine, &mut self.coarse].map(|liquid| liquid.flow.divide(&liquid.columns, threads));
         if divided.contains(&true) {
-            ctx.pool().install(|| attended(threads, || self.whole(dt, cancel)))
+            ctx.pool().install(|| with_spinning_threads(threads, || self.whole(dt, cancel)))
         } else {
             let _flush = FlushDenormals::begin();
             self.whole(dt, cancel)
@@ -60,22 +60,24 @@ impl Detail {
         let halvings = [&mut *fine, &mut *coarse]
             .into_iter()
             .zip(&measures)
-            .map(|(liquid, measures)| liquid.begin(dt, measures, |pace| Some(time_step::next(pace))))
+            .map(|(liquid, measures)| {
+                liquid.begin_frame(dt, measures, |progress| Some(time_step::next_length(progress)))
+            })
             .fold(0, u32::max);
         while report.seconds < dt {
             let left = dt - report.seconds;
             let steps = report.steps;
             let next = |liquid: &Shallow, at: usize| {
-                time_step::next(&liquid.next(&measures[at], left, steps, halvings))
+                time_step::next_length(&liquid.progress(&measures[at], left, steps, halvings))
             };
             let length = next(fine, 0).min(next(coarse, 1));
-            if steps == 0 && left / length > f64::from(MOST_STEPS) || steps >= MOST_STEPS {
+            if steps == 0 && left / length > f64::from(MAX_STEPS) || steps >= MAX_STEPS {
                 return Err(too_many_steps(dt, report.seconds, length));
             }
             seam.begin_step(fine, coarse, &measures[0], length);
             fine.advance(&measures[0], length, &mut report, stop);
             coarse.advance(&measures[1], length, &mut report, stop);
-            if stop.is_asked() {
+            if stop.is_requested() {
                 return Err(Error::Cancelled);
             }
             seam.end_step(fine, coarse, rest);

@@ -23,7 +23,7 @@ impl Ground {
     }
 
     /// The fine ground of the near cells, and the coarse ground of all others.
-    pub fn apart_solids(&self, near: &Cells) -> [Solids; 2] {
+    pub fn divided_solids(&self, near: &Cells) -> [Solids; 2] {
         let Self { fine, coarse } = self;
         [
             Solids::of_cells(fine.grid, fine.heights, |index| {
@@ -36,7 +36,7 @@ impl Ground {
     }
 
     /// The fine cells that belong to the coarse liquid, and the coarse cells that belong to the fine liquid.
-    pub fn apart(near: &Cells) -> [ExcludedCells; 2] {
+    pub fn excluded(near: &Cells) -> [ExcludedCells; 2] {
         [
             ExcludedCells { cells: near.clone(), is_inside: false },
             ExcludedCells { cells: halved(near), is_inside: true },

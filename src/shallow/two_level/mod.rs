@@ -77,10 +77,10 @@ impl Detail {
         check_carried(&params)?;
         ensure(solids.layers() > 0, "the terrain has no surface that faces up within the domain")?;
         let ground = Ground::new(solids);
-        let [beyond, within] = Ground::apart(&near).map(Some);
-        let [fine, coarse] = ground.apart_solids(&near);
-        let fine = Shallow::beside(ctx, &fine, params.clone(), beyond)?;
-        let coarse = Shallow::beside(ctx, &coarse, params, within)?;
+        let [beyond, within] = Ground::excluded(&near).map(Some);
+        let [fine, coarse] = ground.divided_solids(&near);
+        let fine = Shallow::new_excluding(ctx, &fine, params.clone(), beyond)?;
+        let coarse = Shallow::new_excluding(ctx, &coarse, params, within)?;
         let mut detail = Self {
             rest: Rests::new(coarse.columns.grid.cells()),
             fine,
@@ -124,7 +124,7 @@ impl Detail {
         let mut momentum = std::mem::take(&mut self.momentum);
         momentum.begin(self, &self.near, shift::changed(&self.near, &near));
         let old = std::mem::replace(&mut self.near, near);
-        [self.fine.apart, self.coarse.apart] = Ground::apart(&self.near).map(Some);
+        [self.fine.excluded, self.coarse.excluded] = Ground::excluded(&self.near).map(Some);
         self.convert(&old)?;
         self.seam.find(&self.fine, &self.coarse, &self.near);
         momentum.end(self);

@@ -7,7 +7,7 @@ use super::buffers::Momentum;
 use crate::numeric::lists::refill;
 use crate::shallow::Shallow;
 use crate::shallow::columns::grid::Cells;
-use crate::shallow::pipes::cliffs::beside;
+use crate::shallow::pipes::cliffs::index_beyond;
 use crate::shallow::pipes::side::Side;
 
 /// The pipe through a side of a fine cell.
@@ -98,7 +98,8 @@ fn side(detail: &Detail, near: &Cells, cell: [usize; 2], layer: usize, axis: usi
         [false, true] => detail.fine.columns.column(next, layer).map(|column| Pipe::Seam(column, axis, -1)),
         [false, false] if cell[axis] % 2 == 1 => coarse(cell).map(Pipe::Coarse),
         [false, false] => {
-            let before = |column| beside(&detail.coarse.columns, column, [Side::West, Side::North][axis]);
+            let before =
+                |column| index_beyond(&detail.coarse.columns, column, [Side::West, Side::North][axis]);
             coarse(cell).map(|column| Pipe::Within(column, before(column)))
         }
     };

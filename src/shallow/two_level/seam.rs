@@ -14,7 +14,7 @@ use crate::shallow::columns::{Columns, NONE};
 use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::scalars::shares::level;
 use crate::shallow::solver::fast_films;
-use crate::shallow::solver::viscous_flux::{Kind, Step, by_kind, flux_of, split};
+use crate::shallow::solver::viscous_flux::{Step, StepKind, by_kind, flux_of, whole_and_remainder};
 use crate::shallow::time_step::Measures;
 use crate::shallow::{Shallow, time_step};
 
@@ -213,7 +213,7 @@ impl Seam {
 
     /// Finds all fluxes and transfers; returns whether there is a transfer.
     #[inline(always)]
-    fn drive<K: Kind>(&mut self, step: &Step, fine: &Shallow, coarse: &Shallow) -> bool {
+    fn drive<K: StepKind>(&mut self, step: &Step, fine: &Shallow, coarse: &Shallow) -> bool {
         let (bases, coarse_bases) = (fine.columns.bases(), coarse.columns.bases());
         let (depths, coarse_depths) = (fine.flow.depths(), coarse.flow.depths());
         let Self { pipes, positions, gives, takes, .. } = self;
@@ -239,8 +239,8 @@ impl Seam {
             let depth = depth.map(|depth| depth as f32);
             let light = if K::VISCOUS && !K::WHOLE { fast_films::light(step, depth, pipe.flux) } else { 1.0 };
             let flux = flux_of::<K>(step, fall, depth, pipe.flux, pipe.open, light);
-            pipe.flux = step.rested::<K>(fall, depth, flux);
-            [pipe.transfer, pipe.left] = split(pipe.flux, pipe.left);
+            pipe.flux = step.rest_if_slow::<K>(fall, depth, flux);
+            [pipe.transfer, pipe.left] = whole_and_remainder(pipe.flux, pipe.left);
             if pipe.transfer != 0.0 {
                 any = true;
                 add(gives, takes, position, pipe.transfer);

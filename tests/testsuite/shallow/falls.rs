@@ -245,7 +245,7 @@ fn fast_liquid_does_not_pass_through_a_thin_floor() {
 fn there_are_never_more_packets_than_allowed() {
     let ctx = context();
     for most in [1, 20, 100] {
-        let mut liquid = table(&ctx, Falls { most, drop: 0.0, ..Falls::default() });
+        let mut liquid = table(&ctx, Falls { max_packets: most, drop: 0.0, ..Falls::default() });
         let mut fullest = 0;
         for _ in 0..120 {
             liquid.step(&ctx, FRAME).unwrap();
@@ -290,7 +290,7 @@ fn any_number_of_threads_and_a_restored_liquid_make_the_same_bytes() {
             if (x / 20 + z / 3) % 3 == 0 { vec![[DOWN, 0.01 + 1e-5 * x as f64]] } else { vec![[DOWN, 0.15]] }
         });
         let mut liquid =
-            Shallow::new(&ctx, &ground, params(Falls { most: 1 << 16, ..Falls::default() })).unwrap();
+            Shallow::new(&ctx, &ground, params(Falls { max_packets: 1 << 16, ..Falls::default() })).unwrap();
         pour_each(&mut liquid, |[x, z]| 0.0001 * ((x * x + 5 * z) % 23) as f64);
         liquid.frames(&ctx, FRAME, frames);
         (liquid, ctx)
@@ -319,8 +319,11 @@ fn a_state_of_other_falls_is_refused() {
     liquid.frames(&ctx, FRAME, 60);
     let saved = liquid.save();
     let ground = solids([80, 9], CELL, 1.0, |[x, _]| vec![[DOWN, if x < 20 { 0.55 } else { 0.05 }]]);
-    let others =
-        [None, Some(Falls { most: 3, ..Falls::default() }), Some(Falls { height: 0.7, ..Falls::default() })];
+    let others = [
+        None,
+        Some(Falls { max_packets: 3, ..Falls::default() }),
+        Some(Falls { height: 0.7, ..Falls::default() }),
+    ];
     for falls in others {
         let params = Params { falls, ..params(Falls::default()) };
         let mut other = Shallow::new(&ctx, &ground, params).unwrap();
@@ -332,7 +335,7 @@ fn a_state_of_other_falls_is_refused() {
         (Falls { height: -1.0, ..Falls::default() }, "falls.height"),
         (Falls { interval: 0.0, ..Falls::default() }, "falls.interval"),
         (Falls { drop: f64::NAN, ..Falls::default() }, "falls.drop"),
-        (Falls { most: 0, ..Falls::default() }, "falls.most"),
+        (Falls { max_packets: 0, ..Falls::default() }, "falls.most"),
     ] {
         assert!(params(falls).validate().unwrap_err().to_string().contains(name));
     }
@@ -346,7 +349,7 @@ fn a_turned_or_mirrored_scene_has_the_same_falls() {
     let mut flown = 0;
     for seed in 0..30 {
         let mut plan = turnable(seed);
-        plan.params.falls = Some(Falls { height: 0.001, drop: 0.0, most: 400, ..Falls::default() });
+        plan.params.falls = Some(Falls { height: 0.001, drop: 0.0, max_packets: 400, ..Falls::default() });
         let mut liquids = Turn::ALL.map(|turn| plan.make(&ctx, turn));
         for frame in 0..12 {
             let mut dice = Dice(seed << 32 | frame);
@@ -379,7 +382,8 @@ fn terrain_that_moves_under_falls_loses_nothing() {
     for seed in 0..12 {
         let mut dice = Dice(seed);
         let border = [Border::Closed, Border::Open][dice.below(2)];
-        let falls = Falls { height: 0.003, drop: 0.0, most: [40, 4000][dice.below(2)], ..Falls::default() };
+        let falls =
+            Falls { height: 0.003, drop: 0.0, max_packets: [40, 4000][dice.below(2)], ..Falls::default() };
         let params = Params { border, gravity: [dice.between(-3.0, 3.0), -G, 1.0], ..params(falls) };
         let shape = |dice: &mut Dice| {
             let low = [dice.below(30), dice.below(20)];
@@ -405,7 +409,7 @@ fn terrain_that_moves_under_falls_loses_nothing() {
             }
             liquid.step(&ctx, FRAME).unwrap();
             flown += liquid.drops().len();
-            assert!(liquid.drops().len() <= falls.most);
+            assert!(liquid.drops().len() <= falls.max_packets);
             assert_eq!(liquid.balance().error, 0, "seed {seed}, frame {frame}");
         }
         assert!(flown > 100);

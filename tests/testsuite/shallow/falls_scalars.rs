@@ -19,7 +19,7 @@ fn three() -> [Scalar; 3] {
 fn falling(seed: u64) -> Plan {
     let mut plan = turnable(seed);
     let most = if seed.is_multiple_of(3) { 40 } else { 4000 };
-    plan.params.falls = Some(Falls { height: 0.001, drop: 0.0, most, ..Falls::default() });
+    plan.params.falls = Some(Falls { height: 0.001, drop: 0.0, max_packets: most, ..Falls::default() });
     plan
 }
 
@@ -76,7 +76,7 @@ fn shelf(ctx: &Context, most: usize) -> Shallow {
     let solids = stacked(from_corner(0.004, [40, 12]), [0.0, 0.4], |[x, _]| {
         vec![[DOWN, if x < 20 { 0.25 } else { 0.05 }]]
     });
-    let falls = Falls { drop: 0.0, most, ..Falls::default() };
+    let falls = Falls { drop: 0.0, max_packets: most, ..Falls::default() };
     let mut liquid = Shallow::new(ctx, &solids, Params { falls: Some(falls), ..Params::default() }).unwrap();
     liquid.set_flows(&[source([0.06, 0.25, 0.024], 0.004, 5e-6)], |_| "the source".into()).unwrap();
     liquid.set_scalars(&three()).unwrap();
@@ -115,7 +115,7 @@ fn a_restored_liquid_and_any_number_of_threads_carry_the_same_through_the_air() 
         let solids = stacked(from_corner(0.002, [340, 320]), [0.0, 0.3], |[x, z]| {
             vec![[DOWN, if (x / 20 + z / 3) % 3 == 0 { 0.01 + 1e-5 * x as f64 } else { 0.15 }]]
         });
-        let falls = Falls { most: 1 << 16, ..Falls::default() };
+        let falls = Falls { max_packets: 1 << 16, ..Falls::default() };
         let mut liquid =
             Shallow::new(&ctx, &solids, Params { falls: Some(falls), ..Params::default() }).unwrap();
         liquid.set_scalars(&three()).unwrap();

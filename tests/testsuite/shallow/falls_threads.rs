@@ -29,9 +29,9 @@ fn over_an_edge(rate: f64, frames: usize, falls: Falls) -> Shallow {
     liquid
 }
 
-/// The last drop of each lip that flows.
+/// The last drop of each overflow edge that flows.
 fn last_of(liquid: &Shallow) -> Vec<Droplet> {
-    liquid.drops().filter(|drop| drop.lip.is_some()).collect()
+    liquid.drops().filter(|drop| drop.overflow_edge.is_some()).collect()
 }
 
 #[test]
@@ -63,16 +63,16 @@ fn a_strand_joins_the_lip_and_its_last_drop() {
     let liquid = over_an_edge(4e-6, 90, Falls::default());
     let drops: Vec<Droplet> = liquid.drops().collect();
     for drop in &drops {
-        let Some(lip) = drop.lip else { continue };
-        let [x, y, z] = lip.position;
-        assert!((x - EDGE + 0.5 * CELL).abs() < 1e-9 && (z - drop.position[2]).abs() < 1e-9, "{lip:?}");
-        assert!((y - 0.5 * lip.depth - 0.01 - HEIGHT).abs() < 1e-9 && lip.edge == [0.0, 0.0, 1.0]);
+        let Some(edge) = drop.overflow_edge else { continue };
+        let [x, y, z] = edge.position;
+        assert!((x - EDGE + 0.5 * CELL).abs() < 1e-9 && (z - drop.position[2]).abs() < 1e-9, "{edge:?}");
+        assert!((y - 0.5 * edge.depth - 0.01 - HEIGHT).abs() < 1e-9 && edge.edge == [0.0, 0.0, 1.0]);
         assert!(drops.iter().all(|other| other.source != drop.source || other.number <= drop.number));
     }
     let mut balls = Balls::default();
     let with = balls.count(&drops);
     assert!(with.vertices <= bound(drops.len()).vertices && with.indices <= bound(drops.len()).indices);
-    let bare: Vec<Droplet> = drops.iter().map(|drop| Droplet { lip: None, ..*drop }).collect();
+    let bare: Vec<Droplet> = drops.iter().map(|drop| Droplet { overflow_edge: None, ..*drop }).collect();
     let strands = (with.extras - balls.count(&bare).extras) / 18;
     assert_eq!(strands, last_of(&liquid).len());
 }

@@ -21,7 +21,7 @@ use crate::io::files::source;
 use crate::io::records::input_hashes::InputHashes;
 use crate::motion::Space;
 use crate::scene::Scene;
-use crate::shallow::columns::grid::{Grid, Heights, MOST_CELLS, TOP};
+use crate::shallow::columns::grid::{Grid, Heights, MAX_CELLS};
 use crate::shallow::terrain::facing::facing;
 use crate::shallow::terrain::{Solids, triangles};
 use attached::{Attached, attach};
@@ -256,9 +256,9 @@ fn grid(setup: &Shallow, bounds: &[DVec3; 2]) -> Result<Grid> {
     let [x0, z0, x1, z1] = setup.area.unwrap_or([low.x, low.z, high.x, high.z]);
     let cell = setup.cell;
     let counts = [x1 - x0, z1 - z0].map(|length| (length / cell).round().max(1.0));
-    if let Some(count) = counts.into_iter().find(|count| *count > MOST_CELLS as f64) {
+    if let Some(count) = counts.into_iter().find(|count| *count > MAX_CELLS as f64) {
         return Err(Error::argument(format!(
-            "shallow.cell = {cell} m makes {count} cells of {:.6} x {:.6} m, over {MOST_CELLS} along an axis",
+            "shallow.cell = {cell} m makes {count} cells of {:.6} x {:.6} m, over {MAX_CELLS} along an axis",
             x1 - x0,
             z1 - z0
         )));

@@ -5,7 +5,7 @@ use crate::shallow::columns::STRIP;
 
 /// Lateral friction of pipes.
 #[derive(Debug, Clone, Default)]
-pub struct Walls {
+pub struct LateralFriction {
     /// Whether it is enabled.
     pub(super) is_on: bool,
     /// Count of column indices that the lists hold.
@@ -14,16 +14,17 @@ pub struct Walls {
     pub(super) age: u32,
     /// Whether each row may have pipes with friction during these steps.
     pub(super) rows: Vec<bool>,
-    /// Their active strips, and whether each was included when the surroundings of columns were found.
+    /// Their active strips.
     pub(super) strips: Vec<u32>,
-    pub(super) known: Vec<bool>,
+    /// Whether the surroundings of each strip's columns were found.
+    pub(super) has_surroundings: Vec<bool>,
     /// Whether each strip has ceilings, or positions without a column.
     pub(super) roofed: Vec<bool>,
     /// Positions of each strip from which links lead to the east, south, west and north.
     pub(super) linked: Vec<[u16; 4]>,
     pub(super) has_links: bool,
-    /// Across x, then across z: total contact and walls of each column ([`beside::Around`]), contact before it, and contact behind it.
-    pub(super) beside: [[Numbers; 3]; 2],
+    /// Across x, then across z: total contact and walls of each column (`surroundings.rs`), contact before it, and contact behind it.
+    pub(super) surroundings: [[Numbers; 3]; 2],
     pub(super) lines: Lines,
 }
 

@@ -18,17 +18,17 @@ use crate::shallow::solver::pressurised::network::Network;
 use crate::shallow::solver::viscous_flux::{Step, max, min, unpacked};
 
 /// Maximum reductions: a pipe is coupled to all within 16 cells.
-const MOST: usize = 4;
-/// Below this sum of a and b, neighbours take their values of the last step.
-const LAGS: f32 = 0.5;
+const MAX_REDUCTIONS: usize = 4;
+/// If a and b add up to at most this, neighbours take their values of the last step.
+const LAG_LIMIT: f32 = 0.5;
 const ZEROS: [f32; STRIP] = [0.0; STRIP];
 
 /// The inputs of a pass over strips.
 struct Pass<'a> {
     step: &'a Step,
     liquid: &'a Liquid<'a>,
-    known: &'a [bool],
-    beside: &'a [[Numbers; 3]; 2],
+    has_surroundings: &'a [bool],
+    surroundings: &'a [[Numbers; 3]; 2],
     now: &'a [[Numbers; 3]; 2],
     /// Strips before and behind.
     far: [&'a [u32]; 2],
@@ -63,8 +63,8 @@ impl Lines {
         step: &Step,
         liquid: &Liquid,
         strips: &[u32],
-        known: &[bool],
-        beside: &[[Numbers; 3]; 2],
+        has_surroundings: &[bool],
+        surroundings: &[[Numbers; 3]; 2],
     ) {
         let len = liquid.columns.len();
         let count = reductions(step, liquid.row_depths.iter().copied().max().unwrap_or(0));
@@ -73,14 +73,22 @@ impl Lines {
         let solved = solved.each_mut().map(|numbers| &mut numbers.all_mut()[..len]);
         {
             // The first pass reads no coefficients.
-            let pass = Pass { step, liquid, known, beside, now: next, far: [&[], &[]], distance: 1 };
+            let pass = Pass {
+                step,
+                liquid,
+                has_surroundings,
+                surroundings,
+                now: next,
+                far: [&[], &[]],
+                distance: 1,
+            };
             if count == 0 {
                 return pass.over(strips, solved, |pass, strips, start, out| {
-                    first_and_last(pass, strips, start, out, thins);
+                    solve_pass(pass, strips, start, out, thins);
                 });
             }
             pass.over(strips, numbers_of(now, len), |pass, strips, start, out| {
-                first(pass, strips, start, out, thins);
+                begin_pass(pass, strips, start, out, thins);
             });
         }
         set_flooded(now, liquid.network);
@@ -91,13 +99,13 @@ impl Lines {
             let pass = Pass {
                 step,
                 liquid,
-                known,
-                beside,
+                has_surroundings,
+                surroundings,
                 now,
                 far: far.each_ref().map(|far| &far[..]),
                 distance: 1 << reduction,
             };
-            pass.over(strips, numbers_of(next, len), reduce);
+            pass.over(strips, numbers_of(next, len), reduce_pass);
             std::mem::swap(now, next);
             for (far, farther) in far.iter().zip(&mut *farther) {
                 for (position, &other) in farther.iter_mut().zip(far) {
@@ -107,8 +115,8 @@ impl Lines {
             std::mem::swap(far, farther);
         }
         let far = far.each_ref().map(|far| &far[..]);
-        let pass = Pass { step, liquid, known, beside, now, far, distance: 1 << count };
-        pass.over(strips, solved, last);
+        let pass = Pass { step, liquid, has_surroundings, surroundings, now, far, distance: 1 << count };
+        pass.over(strips, solved, end_pass);
     }
 }
 
@@ -133,7 +141,7 @@ fn reductions(step: &Step, deepest: i32) -> usize {
     // a in a line of equal pipes without walls.
     let mut a = step.lateral / (1.0 + 2.0 * step.lateral + step.drag / (deepest * deepest));
     let mut count = 0;
-    while 2.0 * a > LAGS && count < MOST {
+    while 2.0 * a > LAG_LIMIT && count < MAX_REDUCTIONS {
         a = a * a / (1.0 - 2.0 * a * a);
         count += 1;
     }
@@ -148,7 +156,7 @@ fn set_flooded(now: &mut [[Numbers; 3]; 2], network: &Network) {
     }
 }
 
-fn first_and_last(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2], thins: bool) {
+fn solve_pass(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2], thins: bool) {
     if thins {
         dispatch!(solve_strips::<true>(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]));
     } else {
@@ -156,7 +164,7 @@ fn first_and_last(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f3
     }
 }
 
-fn first(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6], thins: bool) {
+fn begin_pass(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6], thins: bool) {
     if thins {
         dispatch!(begin_strips::<true>(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]));
     } else {
@@ -164,11 +172,11 @@ fn first(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6], t
     }
 }
 
-fn reduce(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]) {
+fn reduce_pass(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]) {
     dispatch!(reduce_strips(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]));
 }
 
-fn last(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]) {
+fn end_pass(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]) {
     dispatch!(end_strips(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]));
 }
 
@@ -177,25 +185,25 @@ type System = [[f32; STRIP]; 3];
 
 #[inline(always)]
 fn solve_strips<const THINS: bool>(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]) {
-    let ([east, south], again) = (out, pass.step.again);
+    let ([east, south], step_ratio) = (out, pass.step.step_ratio);
     for &strip in strips {
         let (strip, position) = (strip as usize, strip as usize - start);
-        let ([rest, a, b], [before, behind]) = pass.begin::<THINS, 0>(strip);
-        end_strip(&rest, &a, &b, &before, &behind, again, strip_mut(east, position));
-        let ([rest, a, b], [before, behind]) = pass.begin::<THINS, 1>(strip);
-        end_strip(&rest, &a, &b, &before, &behind, again, strip_mut(south, position));
+        let ([rest, a, b], [before, behind]) = pass.begin_east::<THINS>(strip);
+        end_strip(&rest, &a, &b, &before, &behind, step_ratio, strip_mut(east, position));
+        let ([rest, a, b], [before, behind]) = pass.begin_south::<THINS>(strip);
+        end_strip(&rest, &a, &b, &before, &behind, step_ratio, strip_mut(south, position));
     }
 }
 
 #[inline(always)]
 fn begin_strips<const THINS: bool>(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]) {
     for &strip in strips {
-        let ([rest, a, b], _) = pass.begin::<THINS, 0>(strip as usize);
+        let ([rest, a, b], _) = pass.begin_east::<THINS>(strip as usize);
         let at = (strip as usize - start) * STRIP;
         for (out, numbers) in out.iter_mut().zip([&rest, &a, &b]) {
             out[at..at + STRIP].copy_from_slice(numbers);
         }
-        let ([rest, a, b], _) = pass.begin::<THINS, 1>(strip as usize);
+        let ([rest, a, b], _) = pass.begin_south::<THINS>(strip as usize);
         for (out, numbers) in out[3..].iter_mut().zip([&rest, &a, &b]) {
             out[at..at + STRIP].copy_from_slice(numbers);
         }
@@ -238,7 +246,7 @@ fn end_strips(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 
         for (axis, out) in out.iter_mut().enumerate() {
             let [rest, a, b] = pass.own(axis, strip);
             let (before, behind) = (pass.last_far(axis, strip, 0), pass.last_far(axis, strip, 1));
-            end_strip(rest, a, b, &before, &behind, pass.step.again, strip_mut(out, strip - start));
+            end_strip(rest, a, b, &before, &behind, pass.step.step_ratio, strip_mut(out, strip - start));
         }
     }
 }
@@ -251,11 +259,11 @@ fn end_strip(
     b: &[f32; STRIP],
     before: &[f32; STRIP],
     behind: &[f32; STRIP],
-    again: f32,
+    step_ratio: f32,
     out: &mut [f32; STRIP],
 ) {
     for x in 0..STRIP {
-        out[x] = rest[x] + (a[x] * before[x] + b[x] * behind[x]) * again;
+        out[x] = rest[x] + (a[x] * before[x] + b[x] * behind[x]) * step_ratio;
     }
 }
 
@@ -275,87 +283,101 @@ struct Pipe<'a> {
 }
 
 impl Pass<'_> {
-    /// Coefficients of a strip's pipes, and the last fluxes of those before and behind.
+    /// Coefficients of a strip's pipes to the east, and the last fluxes of those before and behind.
     ///
     /// Written without `map` over arrays: closures that are not inlined are compiled without the caller's instruction set.
     #[inline(always)]
-    fn begin<const THINS: bool, const AXIS: usize>(&self, strip: usize) -> (System, [[f32; STRIP]; 2]) {
-        let Liquid { columns, pipes, fast, depth, flux, .. } = *self.liquid;
+    fn begin_east<const THINS: bool>(&self, strip: usize) -> (System, [[f32; STRIP]; 2]) {
+        let Liquid { columns, pipes, depth, flux, .. } = *self.liquid;
         let (at, bases) = (strip * STRIP, columns.bases());
-        let row = columns.strips()[strip].row as usize;
-        let light = if fast.row(row) { strip_of(&fast.light, strip) } else { &[NORMAL; STRIP] };
-        let [all, contact_before, contact_behind] = &self.beside[AXIS];
-        let (all, all_numbers) = (all.before(strip, 0), all.all());
-        let (first, first_numbers) = (contact_before.before(strip, 0), contact_before.all());
-        let (second, second_numbers) = (contact_behind.before(strip, 0), contact_behind.all());
+        let [total, first, second] = &self.surroundings[0];
+        let own = self.contacts::<0>(strip);
+        // The columns to the east, and those of the rows before and behind. Pipes behind the last column are closed.
+        let is_known = columns.east(strip).is_none_or(|east| self.has_surroundings[east]);
+        let (mut far_total, mut far_first, mut far_second) = (ZEROS, ZEROS, ZEROS);
+        let far = if is_known {
+            [
+                strip_from(total.all(), at + 1),
+                strip_from(first.all(), at + 1),
+                strip_from(second.all(), at + 1),
+            ]
+        } else {
+            far_total[..STRIP - 1].copy_from_slice(&own[0][1..]);
+            far_first[..STRIP - 1].copy_from_slice(&own[1][1..]);
+            far_second[..STRIP - 1].copy_from_slice(&own[2][1..]);
+            [&far_total, &far_first, &far_second]
+        };
+        let [north, south] = [columns.north(strip), columns.south(strip)];
+        let before = if north == NONE { strip } else { north as usize };
+        let behind = if south == NONE { strip } else { south as usize };
+        let pipe = Pipe {
+            base: [strip_of(bases, strip), strip_from(bases, at + 1)],
+            depth: [strip_of(depth, strip), strip_from(depth, at + 1)],
+            open: strip_of(&pipes.east, strip),
+            light: self.light(strip),
+            flux: strip_of(flux[0], strip),
+            all: [own[0], far[0]],
+            contact: [
+                if north == NONE { [&ZEROS; 2] } else { [own[1], far[1]] },
+                if south == NONE { [&ZEROS; 2] } else { [own[2], far[2]] },
+            ],
+            before: [strip_of(depth, before), strip_from(depth, before * STRIP + 1)],
+            behind: [strip_of(depth, behind), strip_from(depth, behind * STRIP + 1)],
+        };
         let mut system = [ZEROS; 3];
         let [rest, a, b] = &mut system;
-        if AXIS == 0 {
-            // The columns to the east, and those of the rows before and behind. Pipes behind the last column are closed.
-            let is_known = columns.east(strip).is_none_or(|east| self.known[east]);
-            let (mut far_all, mut far_first, mut far_second) = (ZEROS, ZEROS, ZEROS);
-            let far = if is_known {
-                [
-                    strip_from(all_numbers, at + 1),
-                    strip_from(first_numbers, at + 1),
-                    strip_from(second_numbers, at + 1),
-                ]
-            } else {
-                far_all[..STRIP - 1].copy_from_slice(&all[1..]);
-                far_first[..STRIP - 1].copy_from_slice(&first[1..]);
-                far_second[..STRIP - 1].copy_from_slice(&second[1..]);
-                [&far_all, &far_first, &far_second]
-            };
-            let [north, south] = [columns.north(strip), columns.south(strip)];
-            let before = if north == NONE { strip } else { north as usize };
-            let behind = if south == NONE { strip } else { south as usize };
-            let pipe = Pipe {
-                base: [strip_of(bases, strip), strip_from(bases, at + 1)],
-                depth: [strip_of(depth, strip), strip_from(depth, at + 1)],
-                open: strip_of(&pipes.east, strip),
-                light,
-                flux: strip_of(flux[0], strip),
-                all: [all, far[0]],
-                contact: [
-                    if north == NONE { [&ZEROS; 2] } else { [first, far[1]] },
-                    if south == NONE { [&ZEROS; 2] } else { [second, far[2]] },
-                ],
-                before: [strip_of(depth, before), strip_from(depth, before * STRIP + 1)],
-                behind: [strip_of(depth, behind), strip_from(depth, behind * STRIP + 1)],
-            };
-            begin_strip::<THINS, 0>(self.step, &pipe, rest, a, b);
-            (system, [*strip_of(flux[0], before), *strip_of(flux[0], behind)])
-        } else {
-            // The columns to the south, and those to the west and east of both.
-            let south = columns.south(strip);
-            let far = if south == NONE { strip } else { south as usize };
-            let [far_all, far_first, far_second] = if south != NONE && self.known[far] {
-                [strip_of(all_numbers, far), strip_of(first_numbers, far), strip_of(second_numbers, far)]
-            } else {
-                [&ZEROS; 3]
-            };
-            let (has_west, has_east) = (columns.west(strip).is_some(), columns.east(strip).is_some());
-            let (own_west, far_west) = (shifted(depth, strip, -1), shifted(depth, far, -1));
-            let pipe = Pipe {
-                base: [strip_of(bases, strip), strip_of(bases, far)],
-                depth: [strip_of(depth, strip), strip_of(depth, far)],
-                open: strip_of(&pipes.south, strip),
-                light,
-                flux: strip_of(flux[1], strip),
-                all: [all, far_all],
-                contact: [[first, far_first], [second, far_second]],
-                before: [&own_west, &far_west],
-                behind: [strip_from(depth, at + 1), strip_from(depth, far * STRIP + 1)],
-            };
-            begin_strip::<THINS, 1>(self.step, &pipe, rest, a, b);
-            if !has_west {
-                a[0] = 0.0;
-            }
-            if !has_east {
-                b[STRIP - 1] = 0.0;
-            }
-            (system, [shifted(flux[1], strip, -1), shifted(flux[1], strip, 1)])
+        begin_strip::<THINS, 0>(self.step, &pipe, rest, a, b);
+        (system, [*strip_of(flux[0], before), *strip_of(flux[0], behind)])
+    }
+
+    /// As [`Pass::begin_east`], for pipes to the south.
+    #[inline(always)]
+    fn begin_south<const THINS: bool>(&self, strip: usize) -> (System, [[f32; STRIP]; 2]) {
+        let Liquid { columns, pipes, depth, flux, .. } = *self.liquid;
+        let (at, bases) = (strip * STRIP, columns.bases());
+        let own = self.contacts::<1>(strip);
+        // The columns to the south, and those to the west and east of both.
+        let south = columns.south(strip);
+        let far = if south == NONE { strip } else { south as usize };
+        let far_own =
+            if south != NONE && self.has_surroundings[far] { self.contacts::<1>(far) } else { [&ZEROS; 3] };
+        let (own_west, far_west) = (shifted(depth, strip, -1), shifted(depth, far, -1));
+        let pipe = Pipe {
+            base: [strip_of(bases, strip), strip_of(bases, far)],
+            depth: [strip_of(depth, strip), strip_of(depth, far)],
+            open: strip_of(&pipes.south, strip),
+            light: self.light(strip),
+            flux: strip_of(flux[1], strip),
+            all: [own[0], far_own[0]],
+            contact: [[own[1], far_own[1]], [own[2], far_own[2]]],
+            before: [&own_west, &far_west],
+            behind: [strip_from(depth, at + 1), strip_from(depth, far * STRIP + 1)],
+        };
+        let mut system = [ZEROS; 3];
+        let [rest, a, b] = &mut system;
+        begin_strip::<THINS, 1>(self.step, &pipe, rest, a, b);
+        if columns.west(strip).is_none() {
+            a[0] = 0.0;
         }
+        if columns.east(strip).is_none() {
+            b[STRIP - 1] = 0.0;
+        }
+        (system, [shifted(flux[1], strip, -1), shifted(flux[1], strip, 1)])
+    }
+
+    /// Total contact and walls of a strip's columns, the contact before them and behind.
+    #[inline(always)]
+    fn contacts<const AXIS: usize>(&self, strip: usize) -> [&[f32; STRIP]; 3] {
+        let [total, first, second] = &self.surroundings[AXIS];
+        [total.before(strip, 0), first.before(strip, 0), second.before(strip, 0)]
+    }
+
+    /// Inertia factors of a strip's pipes.
+    #[inline(always)]
+    fn light(&self, strip: usize) -> &[u32; STRIP] {
+        let Liquid { columns, fast, .. } = *self.liquid;
+        let row = columns.strips()[strip].row as usize;
+        if fast.row(row) { strip_of(&fast.light, strip) } else { &[NORMAL; STRIP] }
     }
 
     /// r, a and b of a strip.
@@ -398,7 +420,7 @@ impl Pass<'_> {
     }
 }
 
-/// The numbers so many positions behind those of a strip; 0 where there is none.
+/// The numbers so many positions after those of a strip; 0 where there is none.
 #[inline(always)]
 fn shifted<T: Copy + Default>(numbers: &[T], strip: usize, positions: isize) -> [T; STRIP] {
     let at = (strip * STRIP) as isize + positions;
@@ -430,9 +452,9 @@ fn begin_strip<const THINS: bool, const AXIS: usize>(
         let mean = 0.5 * (depth[0] + depth[1]);
         let driven = step.kept * flux[x] + step.drive * light * fall as f32 * min(mean, step.section);
         // Without drive, only neighbours move the liquid: the smaller depth is the same from either end.
-        let giver = if driven > 0.0 { depth[0] } else { depth[1] };
-        let giver = if driven == 0.0 { min(depth[0], depth[1]) } else { giver };
-        let square = giver * giver;
+        let donor = if driven > 0.0 { depth[0] } else { depth[1] };
+        let donor = if driven == 0.0 { min(depth[0], depth[1]) } else { donor };
+        let square = donor * donor;
         let thinned = if THINS { step.thinned(flux[x], square) } else { 1.0 };
         let drag = light * if THINS { step.drag * thinned } else { step.drag };
         // On a slope a film is thinner than its vertical depth; for friction at the ground this is in `open`.
@@ -440,17 +462,17 @@ fn begin_strip<const THINS: bool, const AXIS: usize>(
         let steep = 1.0 + min(slope * slope, 3.0);
         let lateral = if THINS { step.lateral * light * thinned } else { step.lateral * light } * steep;
         let open = square * open[x];
-        let beside = lateral * (0.5 * (all[0][x] + all[1][x])) / max(mean, 1.0);
-        let part = open / (open + drag + beside * open);
+        let lateral_drag = lateral * (0.5 * (all[0][x] + all[1][x])) / max(mean, 1.0);
+        let part = open / (open + drag + lateral_drag * open);
         rest[x] = driven * part;
         let part = part * lateral;
-        a[x] = part * taken([contact[0][0][x], contact[0][1][x]], [before[0][x], before[1][x]]);
-        b[x] = part * taken([contact[1][0][x], contact[1][1][x]], [behind[0][x], behind[1][x]]);
+        a[x] = part * contact_share([contact[0][0][x], contact[0][1][x]], [before[0][x], before[1][x]]);
+        b[x] = part * contact_share([contact[1][0][x], contact[1][1][x]], [behind[0][x], behind[1][x]]);
     }
 }
 
 /// The part of a pipe's section that is in contact, from the contact and the depths at both ends.
 #[inline(always)]
-fn taken(contact: [f32; 2], depth: [i32; 2]) -> f32 {
+fn contact_share(contact: [f32; 2], depth: [i32; 2]) -> f32 {
     min((contact[0] + contact[1]) / max(depth[0] as f32 + depth[1] as f32, 1.0), 1.0)
 }

@@ -9,18 +9,18 @@
 //! square duct is 0.7 % below the exact value (White, *Viscous Fluid Flow*, 3-3.3), that of a channel as deep as wide 2.8 % below; flat
 //! ones are closer.
 //!
-//! Differences in y are between a pipe and those beside it; a wall lies half a cell beyond it. The surroundings of a pipe (`beside.rs`) are
-//! the mean of those of the columns at its ends, so that they are the same from either end. All pipes beside each other form a line along x
-//! or z, which is solved at once (`lines.rs`): neither viscosity nor depth limits the step. Films thinner than a sixteenth of a cell have
-//! no lateral friction. Where two rows have only such columns, nothing is computed.
+//! Differences in y are between a pipe and those beside it; a wall lies half a cell beyond it. The surroundings of a pipe
+//! (`surroundings.rs`) are the mean of those of the columns at its ends, so that they are the same from either end. All pipes beside each
+//! other form a line along x or z, which is solved at once (`lines.rs`): neither viscosity nor depth limits the step. Films thinner than a
+//! sixteenth of a cell have no lateral friction. Where two rows have only such columns, nothing is computed.
 
-mod beside;
 mod buffers;
 mod flooded;
 mod lines;
+mod surroundings;
 
+pub use buffers::LateralFriction;
 use buffers::Numbers;
-pub use buffers::Walls;
 use std::ops::Range;
 
 use super::active::Active;
@@ -35,7 +35,7 @@ use crate::shallow::pipes::{Links, Pipes};
 /// Steps of a frame after which the surroundings of columns are found again.
 const STEPS: u32 = 8;
 /// Minimum columns for strips to be divided among threads.
-const LEAST: usize = 64 * STRIP;
+const MIN_COLUMNS: usize = 64 * STRIP;
 
 /// The liquid whose friction is computed.
 #[derive(Clone, Copy)]
@@ -55,9 +55,9 @@ pub struct Liquid<'a> {
     pub is_divided: bool,
 }
 
-impl Walls {
+impl LateralFriction {
     /// Allocates memory for the friction of these columns.
-    pub fn turn_on(&mut self, columns: &Columns) {
+    pub fn enable(&mut self, columns: &Columns) {
         self.is_on = true;
         self.fit(columns);
     }
@@ -72,13 +72,13 @@ impl Walls {
         reset(&mut self.rows, columns.grid.size[1], false);
         self.strips.clear();
         self.strips.reserve(strips);
-        reset(&mut self.known, strips, false);
+        reset(&mut self.has_surroundings, strips, false);
         reset(&mut self.linked, strips, [0; 4]);
         let has_roof = |strip| strip_of(columns.ceilings(), strip).iter().any(|&ceiling| ceiling < TOP);
         refill(&mut self.roofed, (0..strips).map(has_roof));
         if self.len != len {
             self.len = len;
-            for (position, numbers) in self.beside.iter_mut().flatten().enumerate() {
+            for (position, numbers) in self.surroundings.iter_mut().flatten().enumerate() {
                 numbers.fit(position, len);
             }
             self.lines.fit(columns);
@@ -87,8 +87,8 @@ impl Walls {
 
     /// Memory (bytes).
     pub fn bytes(&self) -> usize {
-        let numbers = self.beside.iter().flatten().map(|numbers| size_of_val(&numbers.list[..]));
-        numbers.sum::<usize>() + self.lines.bytes() + self.rows.len() + 14 * self.known.len()
+        let numbers = self.surroundings.iter().flatten().map(|numbers| size_of_val(&numbers.list[..]));
+        numbers.sum::<usize>() + self.lines.bytes() + self.rows.len() + 14 * self.has_surroundings.len()
     }
 
     /// Begins a frame.
@@ -98,7 +98,7 @@ impl Walls {
 
     /// Whether the fluxes of a row's pipes are solved with lateral friction.
     #[inline(always)]
-    pub fn row(&self, row: usize) -> bool {
+    pub fn includes_row(&self, row: usize) -> bool {
         self.is_on && self.rows[row]
     }
 
@@ -117,8 +117,9 @@ impl Walls {
             return;
         }
         if self.age.is_multiple_of(STEPS) {
-            let is_deep =
-                |row: usize| row_depths.get(row).is_some_and(|&deepest| beside::counts(step, deepest));
+            let is_deep = |row: usize| {
+                row_depths.get(row).is_some_and(|&deepest| surroundings::has_friction(step, deepest))
+            };
             for (row, has) in self.rows.iter_mut().enumerate() {
                 *has = is_deep(row) || is_deep(row + 1);
             }
@@ -131,10 +132,10 @@ impl Walls {
         if !self.is_on || step.lateral == 0.0 {
             return;
         }
-        let is_new = self.age.is_multiple_of(STEPS);
+        let is_outdated = self.age.is_multiple_of(STEPS);
         self.age += 1;
-        if is_new {
-            self.known.fill(false);
+        if is_outdated {
+            self.has_surroundings.fill(false);
         }
         self.strips.clear();
         let active = &liquid.active.active;
@@ -145,20 +146,20 @@ impl Walls {
         if self.strips.is_empty() {
             return;
         }
-        if is_new {
-            self.find_beside(step, liquid);
+        if is_outdated {
+            self.find_surroundings(step, liquid);
         }
         for &strip in &self.strips {
             let strip = strip as usize;
-            if !std::mem::replace(&mut self.known[strip], true) && !is_new {
+            if !std::mem::replace(&mut self.has_surroundings[strip], true) && !is_outdated {
                 // It was dry when the surroundings were found.
-                for numbers in self.beside.iter_mut().flatten() {
+                for numbers in self.surroundings.iter_mut().flatten() {
                     numbers.all_mut()[strip * STRIP..][..STRIP].fill(0.0);
                 }
             }
         }
-        let Self { strips, known, beside, lines, .. } = self;
-        lines.solve(step, liquid, strips, known, beside);
+        let Self { strips, has_surroundings, surroundings, lines, .. } = self;
+        lines.solve(step, liquid, strips, has_surroundings, surroundings);
     }
 
     /// Marks the positions of strips from which links lead over a side: there is no wall.
@@ -176,14 +177,14 @@ impl Walls {
         }
     }
 
-    fn find_beside(&mut self, step: &Step, liquid: &Liquid) {
-        let Self { strips, roofed, linked, beside, .. } = self;
-        let around = beside::Around { columns: liquid.columns, depth: liquid.depth, roofed, linked };
+    fn find_surroundings(&mut self, step: &Step, liquid: &Liquid) {
+        let Self { strips, roofed, linked, surroundings, .. } = self;
+        let around = surroundings::Around { columns: liquid.columns, depth: liquid.depth, roofed, linked };
         let len = liquid.columns.len();
         let work = |range: Range<usize>, out: [&mut [f32]; 6]| {
-            beside::find(step, &around, within(strips, &range), range.start, out);
+            surroundings::find(step, &around, within(strips, &range), range.start, out);
         };
-        spread(liquid.is_divided, 0..len / STRIP, numbers_of(beside, len), &work);
+        spread(liquid.is_divided, 0..len / STRIP, numbers_of(surroundings, len), &work);
     }
 }
 
@@ -207,7 +208,7 @@ fn spread<const N: usize>(
     out: [&mut [f32]; N],
     work: &(impl Fn(Range<usize>, [&mut [f32]; N]) + Sync),
 ) {
-    if !is_divided || strips.len() * STRIP <= LEAST {
+    if !is_divided || strips.len() * STRIP <= MIN_COLUMNS {
         return work(strips, out);
     }
     let half = strips.len() / 2;

@@ -3,14 +3,14 @@
 //! Each iteration reads and writes all nodes several times: so their numbers are kept in separate arrays, and neighbours are found without
 //! the pipes.
 
-use super::edges::{At, Edge};
-use super::nodes::{GIVE, LINK_SCALE, Node, scaled};
+use super::edges::{Edge, PipeIndex};
+use super::nodes::{LINK_SCALE, Node, REGULARISATION, scaled};
 use crate::numeric::lists::{refill, reset};
 use crate::shallow::columns::NONE;
 use crate::shallow::solver::stop::Stop;
 
 /// Maximum iterations for the heads of a step.
-const ITERATIONS: usize = 500;
+const MAX_ITERATIONS: usize = 500;
 /// Tolerance (units) of a column's head, if those around it were exact.
 const RESIDUAL: f64 = 0.005;
 /// Numbers that are summed in parallel.
@@ -19,19 +19,19 @@ const LANES: usize = 8;
 /// The linear system of a step, and the vectors of the iteration.
 #[derive(Debug, Clone, Default)]
 pub(in crate::shallow::solver) struct Gradients {
-    /// Nodes to the east, west, south and north of each, and the conductance of the pipes to them; where there is none, the index behind
-    /// the last node.
-    beside: Vec<[u32; 4]>,
-    through: Vec<[f64; 4]>,
+    /// Nodes to the east, west, south and north of each, and the conductance of the pipes to them; where there is none, the index after the
+    /// last node.
+    neighbours: Vec<[u32; 4]>,
+    conductances: Vec<[f64; 4]>,
     links: Vec<Link>,
     /// Sum over the links of each node, in 1/65536 unit; empty without links.
     linked: Vec<i64>,
     /// 1 where a node is in the system, else 0.
-    held: Vec<f64>,
+    in_system: Vec<f64>,
     diagonal: Vec<f64>,
-    over: Vec<f64>,
+    excess_heads: Vec<f64>,
     residual: Vec<f64>,
-    /// One for each node, and a 0 behind the last.
+    /// One for each node, and a 0 after the last.
     direction: Vec<f64>,
     product: Vec<f64>,
     /// Terms of a sum.
@@ -50,13 +50,13 @@ impl Gradients {
     pub fn with_room(room: usize) -> Self {
         let numbers = || Vec::with_capacity(room + 1);
         Self {
-            beside: Vec::with_capacity(room),
-            through: Vec::with_capacity(room),
+            neighbours: Vec::with_capacity(room),
+            conductances: Vec::with_capacity(room),
             links: Vec::with_capacity(room),
             linked: Vec::with_capacity(room),
-            held: numbers(),
+            in_system: numbers(),
             diagonal: numbers(),
-            over: numbers(),
+            excess_heads: numbers(),
             residual: numbers(),
             direction: numbers(),
             product: numbers(),
@@ -68,21 +68,21 @@ impl Gradients {
     pub fn set(&mut self, nodes: &[Node], edges: &[Edge]) {
         let count = nodes.len();
         let node = |end: u32| end.min(count as u32);
-        self.beside.clear();
-        self.through.clear();
+        self.neighbours.clear();
+        self.conductances.clear();
         for node_edges in nodes.iter().map(|node| node.edges) {
-            let mut beside = [count as u32; 4];
-            let mut through = [0.0; 4];
+            let mut neighbours = [count as u32; 4];
+            let mut conductances = [0.0; 4];
             for (side, edge) in node_edges.into_iter().enumerate().filter(|(_, edge)| *edge != NONE) {
                 let edge = &edges[edge as usize];
                 // The node is the first end of its pipes to the east and to the south.
-                beside[side] = node(edge.ends[1 - side % 2]);
-                through[side] = edge.conductance;
+                neighbours[side] = node(edge.ends[1 - side % 2]);
+                conductances[side] = edge.conductance;
             }
-            self.beside.push(beside);
-            self.through.push(through);
+            self.neighbours.push(neighbours);
+            self.conductances.push(conductances);
         }
-        let links = edges.iter().filter(|edge| matches!(edge.at, At::Link(_)));
+        let links = edges.iter().filter(|edge| matches!(edge.at, PipeIndex::Link(_)));
         refill(
             &mut self.links,
             links.map(|edge| Link { ends: edge.ends.map(node), conductance: edge.conductance }),
@@ -94,58 +94,59 @@ impl Gradients {
     /// meaningless.
     pub fn solve(&mut self, nodes: &mut [Node], stop: &Stop) {
         self.begin(nodes);
-        let mut rest = self.by_diagonal();
-        for _ in 0..ITERATIONS {
-            if self.is_done() || stop.is_asked() {
+        let mut norm = self.preconditioned_norm();
+        for _ in 0..MAX_ITERATIONS {
+            if self.is_done() || stop.is_requested() {
                 break;
             }
             self.apply();
-            let along = self.along();
-            if along <= 0.0 || rest <= 0.0 {
+            let curvature = self.curvature();
+            if curvature <= 0.0 || norm <= 0.0 {
                 break;
             }
-            self.go(rest / along);
-            let next = self.by_diagonal();
-            self.turn(next / rest);
-            rest = next;
+            self.advance(norm / curvature);
+            let next = self.preconditioned_norm();
+            self.update_direction(next / norm);
+            norm = next;
         }
-        for (node, over) in nodes.iter_mut().zip(&self.over) {
-            node.over = *over;
+        for (node, excess) in nodes.iter_mut().zip(&self.excess_heads) {
+            node.excess_head = *excess;
         }
     }
 
     /// Starts from the present heads of the nodes.
     fn begin(&mut self, nodes: &mut [Node]) {
         let count = nodes.len();
-        let number = |held: bool| if held { 1.0 } else { 0.0 };
+        let number = |is_in_system: bool| if is_in_system { 1.0 } else { 0.0 };
         type Value = fn(&Node) -> f64;
         let lists: [(&mut Vec<f64>, Value); 4] = [
             (&mut self.diagonal, |node| node.diagonal),
-            (&mut self.over, |node| node.over),
+            (&mut self.excess_heads, |node| node.excess_head),
             (&mut self.residual, |node| node.right),
-            (&mut self.direction, |node| if node.is_held { node.over } else { 0.0 }),
+            (&mut self.direction, |node| if node.is_in_system { node.excess_head } else { 0.0 }),
         ];
         for (list, number) in lists {
             refill(list, nodes.iter().map(number));
         }
         self.direction.push(0.0);
-        reset(&mut self.held, count, 1.0);
+        reset(&mut self.in_system, count, 1.0);
         self.product.resize(count, 0.0);
         self.apply();
         for (at, node) in nodes.iter_mut().enumerate() {
-            node.is_held &= node.diagonal > 0.0;
-            let residual = if node.is_held { node.right - self.product[at] } else { 0.0 };
+            node.is_in_system &= node.diagonal > 0.0;
+            let residual = if node.is_in_system { node.right - self.product[at] } else { 0.0 };
             self.residual[at] = residual;
-            self.direction[at] = if node.is_held { residual / node.diagonal } else { 0.0 };
-            self.held[at] = number(node.is_held);
+            self.direction[at] = if node.is_in_system { residual / node.diagonal } else { 0.0 };
+            self.in_system[at] = number(node.is_in_system);
         }
     }
 
     /// Whether all residuals are within the tolerance.
     fn is_done(&self) -> bool {
         // Link sums are no more precise than this.
-        const LEAST: f64 = 4.0 / LINK_SCALE;
-        let is_near = |(residual, diagonal): (&f64, &f64)| residual.abs() <= (RESIDUAL * diagonal).max(LEAST);
+        const MIN_RESIDUAL: f64 = 4.0 / LINK_SCALE;
+        let is_near =
+            |(residual, diagonal): (&f64, &f64)| residual.abs() <= (RESIDUAL * diagonal).max(MIN_RESIDUAL);
         self.residual.iter().zip(&self.diagonal).all(is_near)
     }
 
@@ -160,14 +161,15 @@ impl Gradients {
                 self.linked[to] -= flow;
             }
         }
-        let Self { beside, through, direction, diagonal, held, product, .. } = self;
-        let nodes = beside.iter().zip(through).zip(&direction[..]).zip(diagonal).zip(held).zip(product);
-        for (((((beside, through), own), diagonal), held), product) in nodes {
-            let [east, west, south, north] = beside.map(|node| direction[node as usize]);
-            let east_west = through[0] * (own - east) - through[1] * (west - own);
-            let south_north = through[2] * (own - south) - through[3] * (north - own);
-            let all = (east_west + south_north) + GIVE * *diagonal * own;
-            *product = if *held > 0.0 { all } else { 0.0 };
+        let Self { neighbours, conductances, direction, diagonal, in_system, product, .. } = self;
+        let nodes =
+            neighbours.iter().zip(conductances).zip(&direction[..]).zip(diagonal).zip(in_system).zip(product);
+        for (((((neighbours, conductances), own), diagonal), in_system), product) in nodes {
+            let [east, west, south, north] = neighbours.map(|node| direction[node as usize]);
+            let east_west = conductances[0] * (own - east) - conductances[1] * (west - own);
+            let south_north = conductances[2] * (own - south) - conductances[3] * (north - own);
+            let all = (east_west + south_north) + REGULARISATION * *diagonal * own;
+            *product = if *in_system > 0.0 { all } else { 0.0 };
         }
         if !self.linked.is_empty() {
             self.apply_links();
@@ -176,48 +178,52 @@ impl Gradients {
 
     /// As [`Gradients::apply`], at nodes with links, in the same order.
     fn apply_links(&mut self) {
-        for at in (0..self.product.len()).filter(|&at| self.linked[at] != 0 && self.held[at] > 0.0) {
-            let (beside, through, own) = (self.beside[at], self.through[at], self.direction[at]);
-            let [east, west, south, north] = beside.map(|node| self.direction[node as usize]);
-            let east_west = through[0] * (own - east) - through[1] * (west - own);
-            let south_north = through[2] * (own - south) - through[3] * (north - own);
+        for at in (0..self.product.len()).filter(|&at| self.linked[at] != 0 && self.in_system[at] > 0.0) {
+            let (neighbours, conductances, own) =
+                (self.neighbours[at], self.conductances[at], self.direction[at]);
+            let [east, west, south, north] = neighbours.map(|node| self.direction[node as usize]);
+            let east_west = conductances[0] * (own - east) - conductances[1] * (west - own);
+            let south_north = conductances[2] * (own - south) - conductances[3] * (north - own);
             let out = (east_west + south_north) + self.linked[at] as f64 / LINK_SCALE;
-            self.product[at] = out + GIVE * self.diagonal[at] * own;
+            self.product[at] = out + REGULARISATION * self.diagonal[at] * own;
         }
     }
 
     /// Advances along the search direction.
-    fn go(&mut self, step: f64) {
-        let Self { over, residual, direction, product, held, .. } = self;
-        let nodes = over.iter_mut().zip(residual).zip(&direction[..]).zip(product).zip(held);
-        for ((((over, residual), direction), product), held) in nodes {
-            let is_held = *held > 0.0;
-            *over = if is_held { *over + step * direction } else { *over };
-            *residual = if is_held { *residual - step * *product } else { *residual };
+    fn advance(&mut self, step: f64) {
+        let Self { excess_heads, residual, direction, product, in_system, .. } = self;
+        let nodes = excess_heads.iter_mut().zip(residual).zip(&direction[..]).zip(product).zip(in_system);
+        for ((((head, residual), direction), product), in_system) in nodes {
+            let is_in_system = *in_system > 0.0;
+            *head = if is_in_system { *head + step * direction } else { *head };
+            *residual = if is_in_system { *residual - step * *product } else { *residual };
         }
     }
 
     /// Updates the search direction.
-    fn turn(&mut self, part: f64) {
-        let Self { residual, direction, diagonal, held, .. } = self;
-        for (((direction, residual), diagonal), held) in
-            direction.iter_mut().zip(residual).zip(diagonal).zip(held)
+    fn update_direction(&mut self, part: f64) {
+        let Self { residual, direction, diagonal, in_system, .. } = self;
+        for (((direction, residual), diagonal), in_system) in
+            direction.iter_mut().zip(residual).zip(diagonal).zip(in_system)
         {
-            *direction = if *held > 0.0 { *residual / *diagonal + part * *direction } else { *direction };
+            *direction =
+                if *in_system > 0.0 { *residual / *diagonal + part * *direction } else { *direction };
         }
     }
 
-    fn along(&mut self) -> f64 {
+    /// Dot product of the search direction and the matrix applied to it.
+    fn curvature(&mut self) -> f64 {
         let Self { addends, direction, product, .. } = self;
         refill(addends, direction.iter().zip(product).map(|(direction, product)| direction * *product));
         fixed_sum(addends)
     }
 
-    fn by_diagonal(&mut self) -> f64 {
-        let Self { addends, residual, diagonal, held, .. } = self;
-        let nodes = residual.iter().zip(&*diagonal).zip(&*held);
-        let part = |((residual, diagonal), held): ((&f64, &f64), &f64)| {
-            if *held > 0.0 { residual * residual / diagonal } else { 0.0 }
+    /// Squared norm of the residual, preconditioned.
+    fn preconditioned_norm(&mut self) -> f64 {
+        let Self { addends, residual, diagonal, in_system, .. } = self;
+        let nodes = residual.iter().zip(&*diagonal).zip(&*in_system);
+        let part = |((residual, diagonal), in_system): ((&f64, &f64), &f64)| {
+            if *in_system > 0.0 { residual * residual / diagonal } else { 0.0 }
         };
         refill(addends, nodes.map(part));
         fixed_sum(addends)
@@ -227,14 +233,14 @@ impl Gradients {
 /// A sum that does not depend on its order: terms are truncated to 2^-40 of the power of two below the largest.
 fn fixed_sum(numbers: &[f64]) -> f64 {
     let (chunks, rest) = numbers.as_chunks::<LANES>();
-    let mut most = [0.0; LANES];
-    let larger = |most: f64, number: f64| if number.abs() > most { number.abs() } else { most };
+    let mut largest = [0.0; LANES];
+    let larger = |largest: f64, number: f64| if number.abs() > largest { number.abs() } else { largest };
     for chunk in chunks {
         for lane in 0..LANES {
-            most[lane] = larger(most[lane], chunk[lane]);
+            largest[lane] = larger(largest[lane], chunk[lane]);
         }
     }
-    let greatest = rest.iter().chain(&most).fold(0.0, |most, number| larger(most, *number));
+    let greatest = rest.iter().chain(&largest).fold(0.0, |largest, number| larger(largest, *number));
     if greatest == 0.0 || !greatest.is_finite() {
         return greatest;
     }

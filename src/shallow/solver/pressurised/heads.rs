@@ -1,27 +1,27 @@
 //! The linear system for the heads of full columns, which [`super::gradients`] solves.
 
-use super::edges::{At, Edge};
+use super::edges::{Edge, PipeIndex};
 use super::network::Network;
-use super::nodes::{GIVE, LINK_SCALE, scaled};
+use super::nodes::{LINK_SCALE, REGULARISATION, scaled};
 use crate::shallow::columns::{Columns, NONE};
 use crate::shallow::solver::stop::Stop;
 
 /// Part of a full column's missing liquid that is to flow in during a step.
 const REFILL: f64 = 0.5;
 
-/// Maximum rounds in which columns with a head below their surface leave the system.
-const RELEASES: usize = 3;
+/// Maximum rounds in which columns with a head below their surface are removed from the system.
+const MAX_RELEASES: usize = 3;
 
 impl Network {
     /// Finds the heads of full columns with which inflow and outflow of each are equal.
     pub(in crate::shallow::solver) fn find_heads(&mut self, columns: &Columns, stop: &Stop) {
         self.gradients.set(&self.nodes, &self.edges);
-        for _ in 0..=RELEASES {
+        for _ in 0..=MAX_RELEASES {
             self.set_up(columns);
             self.gradients.solve(&mut self.nodes, stop);
             let mut released = false;
-            for node in self.nodes.iter_mut().filter(|node| node.is_held && node.over < 0.0) {
-                (node.is_held, node.over) = (false, 0.0);
+            for node in self.nodes.iter_mut().filter(|node| node.is_in_system && node.excess_head < 0.0) {
+                (node.is_in_system, node.excess_head) = (false, 0.0);
                 released = true;
             }
             if !released {
@@ -29,7 +29,7 @@ impl Network {
             }
         }
         for (node, party) in self.nodes.iter().zip(&self.parties) {
-            self.over[party.column as usize] = node.over as f32;
+            self.excess_heads[party.column as usize] = node.excess_head as f32;
         }
     }
 
@@ -58,7 +58,7 @@ impl Network {
             self.nodes[node].right = -missing - out;
         }
         // The same sums, of conductances: both ends count as outflow.
-        let links = self.edges.iter().filter(|edge| matches!(edge.at, At::Link(_)));
+        let links = self.edges.iter().filter(|edge| matches!(edge.at, PipeIndex::Link(_)));
         self.nodes.iter_mut().for_each(|node| node.linked = 0);
         for edge in links {
             for end in edge.ends {
@@ -72,14 +72,14 @@ impl Network {
                 |edge: u32| if edge == NONE { 0.0 } else { self.edges[edge as usize].conductance };
             let [east, west, south, north] = node.edges.map(conductance);
             node.diagonal =
-                ((east + west) + (south + north) + node.linked as f64 / LINK_SCALE) * (1.0 + GIVE);
+                ((east + west) + (south + north) + node.linked as f64 / LINK_SCALE) * (1.0 + REGULARISATION);
         }
     }
 
     /// Adds the flow through links to their nodes.
     fn sum_links(&mut self, flow: impl Fn(&Edge) -> f64) {
         self.nodes.iter_mut().for_each(|node| node.linked = 0);
-        for edge in self.edges.iter().filter(|edge| matches!(edge.at, At::Link(_))) {
+        for edge in self.edges.iter().filter(|edge| matches!(edge.at, PipeIndex::Link(_))) {
             let flow = scaled(flow(edge));
             for (end, flow) in edge.ends.into_iter().zip([flow, -flow]) {
                 if let Some(node) = self.nodes.get_mut(end as usize) {

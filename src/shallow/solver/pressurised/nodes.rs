@@ -5,10 +5,10 @@ use std::cmp::Ordering;
 use crate::shallow::columns::{Columns, NONE};
 
 /// Heads closer than this (units) are equal, like surfaces that differ by less than a unit: liquid at rest stays at rest.
-pub(in crate::shallow::solver) const EQUAL: f64 = 0.5;
+pub(in crate::shallow::solver) const HEAD_TOLERANCE: f64 = 0.5;
 
 /// Regularisation of the diagonal, as part of the conductance: just enough that a closed cavity has a solution.
-pub(in crate::shallow::solver) const GIVE: f64 = 1e-12;
+pub(in crate::shallow::solver) const REGULARISATION: f64 = 1e-12;
 
 /// Fractions of a unit in which flows through links are summed.
 pub(in crate::shallow::solver) const LINK_SCALE: f64 = 65536.0;
@@ -19,9 +19,9 @@ pub(in crate::shallow::solver) struct Node {
     /// Its pipes to the east, west, south and north, or [`NONE`].
     pub edges: [u32; 4],
     /// Whether it is still in the system.
-    pub is_held: bool,
+    pub is_in_system: bool,
     /// Head above its surface (units).
-    pub over: f64,
+    pub excess_head: f64,
     /// Right side: the inflow required, less the inflow without heads; and the diagonal of the system.
     pub right: f64,
     pub diagonal: f64,
@@ -31,8 +31,8 @@ pub(in crate::shallow::solver) struct Node {
 
 impl Node {
     /// A node with the head above its surface of the last step.
-    pub fn new(over: f64) -> Self {
-        Self { edges: [NONE; 4], is_held: true, over, right: 0.0, diagonal: 0.0, linked: 0 }
+    pub fn new(excess_head: f64) -> Self {
+        Self { edges: [NONE; 4], is_in_system: true, excess_head, right: 0.0, diagonal: 0.0, linked: 0 }
     }
 }
 

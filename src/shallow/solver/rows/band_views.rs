@@ -9,7 +9,7 @@ use crate::shallow::pipes::Links;
 use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::solver::link_flow::LinkFlow;
 
-/// Rows that a band sees beyond its own: three of whose transfers are found, and one of which only depths are read.
+/// Rows that a band sees beyond its own on each side: the transfers of three are found, of the fourth only depths are read.
 pub const BEYOND: usize = 4;
 
 /// A run of rows of all arrays; columns and links are counted from the start of the run.
@@ -21,7 +21,7 @@ pub struct Part<'a> {
     /// Flux to the east and to the south (units a step).
     pub flux: [&'a mut [f32]; 2],
     /// Remainders of transfers, to the east and to the south (units).
-    pub left: [&'a mut [f32]; 2],
+    pub remainder: [&'a mut [f32]; 2],
     /// Fluxes, remainders and transfers of links.
     pub links: LinkPart<'a>,
     /// Amounts of scalars; empty without them.
@@ -35,7 +35,7 @@ pub struct LinkPart<'a> {
     /// Flux (units a step).
     pub flux: &'a mut [f32],
     /// Remainder of the transfer (units).
-    pub left: &'a mut [f32],
+    pub remainder: &'a mut [f32],
     /// Transfer in this step (units).
     pub transfer: &'a mut [f32],
     /// Amounts that fell freely over each link; empty without scalars.
@@ -44,18 +44,18 @@ pub struct LinkPart<'a> {
 
 /// Copies of the rows beside a band.
 #[derive(Debug, Clone, Default)]
-pub struct Copy {
+pub struct RowCopies {
     /// The rows that are copied.
     pub rows: Range<usize>,
     depth: Vec<i32>,
     flux: [Vec<f32>; 2],
-    left: [Vec<f32>; 2],
+    remainder: [Vec<f32>; 2],
     links: LinkFlow,
     amounts: [Vec<f64>; MAX_SCALARS],
 }
 
-/// The three parts that a band sees: before it, its own, behind it.
-pub struct Parts<'a> {
+/// The rows that a band sees, in three parts: copies before it, its own, copies after it.
+pub struct BandView<'a> {
     /// The band's own rows.
     pub rows: Range<usize>,
     /// The first row that it sees.
@@ -63,7 +63,7 @@ pub struct Parts<'a> {
     parts: [Part<'a>; 3],
 }
 
-impl Copy {
+impl RowCopies {
     /// Copies some rows of a liquid.
     pub fn take(&mut self, columns: &Columns, links: &Links, rows: Range<usize>, liquid: &Part) {
         let (columns, links) = (indices(columns, &rows), link_range(links, &rows));
@@ -72,13 +72,13 @@ impl Copy {
         liquid.depth[columns.start..columns.end + STRIP].clone_into(&mut self.depth);
         for axis in 0..2 {
             liquid.flux[axis][columns.clone()].clone_into(&mut self.flux[axis]);
-            liquid.left[axis][columns.clone()].clone_into(&mut self.left[axis]);
+            liquid.remainder[axis][columns.clone()].clone_into(&mut self.remainder[axis]);
         }
         for (own, amounts) in self.amounts.iter_mut().zip(&liquid.amounts) {
             amounts.get(columns.clone()).unwrap_or_default().clone_into(own);
         }
         liquid.links.flux[links.clone()].clone_into(&mut self.links.flux);
-        liquid.links.left[links.clone()].clone_into(&mut self.links.left);
+        liquid.links.remainder[links.clone()].clone_into(&mut self.links.remainder);
         liquid.links.transfer[links.clone()].clone_into(&mut self.links.transfer);
         for (own, fallen) in self.links.fallen.iter_mut().zip(&liquid.links.fallen) {
             fallen.get(links.clone()).unwrap_or_default().clone_into(own);
@@ -90,7 +90,7 @@ impl Copy {
         let mut part = Part::new(
             &mut self.depth,
             self.flux.each_mut().map(Vec::as_mut_slice),
-            self.left.each_mut().map(Vec::as_mut_slice),
+            self.remainder.each_mut().map(Vec::as_mut_slice),
             &mut self.links,
             self.amounts.each_mut().map(Vec::as_mut_slice),
         );
@@ -105,7 +105,7 @@ impl<'a> Part<'a> {
     pub fn new(
         depth: &'a mut [i32],
         flux: [&'a mut [f32]; 2],
-        left: [&'a mut [f32]; 2],
+        remainder: [&'a mut [f32]; 2],
         links: &'a mut LinkFlow,
         amounts: [&'a mut [f64]; MAX_SCALARS],
     ) -> Self {
@@ -113,11 +113,11 @@ impl<'a> Part<'a> {
             start: 0,
             depth,
             flux,
-            left,
+            remainder,
             links: LinkPart {
                 first: 0,
                 flux: &mut links.flux,
-                left: &mut links.left,
+                remainder: &mut links.remainder,
                 transfer: &mut links.transfer,
                 fallen: links.fallen.each_mut().map(Vec::as_mut_slice),
             },
@@ -133,15 +133,15 @@ impl<'a> Part<'a> {
         let at = index - start;
         let [[depth], [depth_behind]] = split_each([self.depth], at);
         let [flux, flux_behind] = split_each(self.flux, at);
-        let [left, left_behind] = split_each(self.left, at);
+        let [remainder, remainder_behind] = split_each(self.remainder, at);
         let [links, links_behind] = self.links.split(link);
         let [amounts, amounts_behind] = split_each(self.amounts, at);
-        let before = Self { start, depth, flux, left, links, amounts };
+        let before = Self { start, depth, flux, remainder, links, amounts };
         let behind = Self {
             start: index,
             depth: depth_behind,
             flux: flux_behind,
-            left: left_behind,
+            remainder: remainder_behind,
             links: links_behind,
             amounts: amounts_behind,
         };
@@ -152,13 +152,13 @@ impl<'a> Part<'a> {
 impl<'a> LinkPart<'a> {
     /// Splits the part before a link.
     fn split(self, link: usize) -> [Self; 2] {
-        let Self { first, flux, left, transfer, fallen } = self;
-        let [before, behind] = split_each([flux, left, transfer], link - first);
+        let Self { first, flux, remainder, transfer, fallen } = self;
+        let [before, behind] = split_each([flux, remainder, transfer], link - first);
         let [fallen, fallen_behind] = split_each(fallen, link - first);
-        let part = |first, [flux, left, transfer]: [&'a mut [f32]; 3], fallen| Self {
+        let part = |first, [flux, remainder, transfer]: [&'a mut [f32]; 3], fallen| Self {
             first,
             flux,
-            left,
+            remainder,
             transfer,
             fallen,
         };
@@ -166,7 +166,7 @@ impl<'a> LinkPart<'a> {
     }
 }
 
-impl<'a> Parts<'a> {
+impl<'a> BandView<'a> {
     /// A band's rows, and copies of those before and behind.
     pub fn new(rows: Range<usize>, before: Part<'a>, own: Part<'a>, behind: Part<'a>) -> Self {
         Self { first: rows.start.saturating_sub(BEYOND), rows, parts: [before, own, behind] }
@@ -174,20 +174,20 @@ impl<'a> Parts<'a> {
 
     /// The part that a row is in.
     #[inline(always)]
-    pub fn of(&mut self, row: usize) -> &mut Part<'a> {
+    pub fn part_mut(&mut self, row: usize) -> &mut Part<'a> {
         let part = self.position(row);
         &mut self.parts[part]
     }
 
     /// The part that a row is in, read-only.
     #[inline(always)]
-    pub fn see(&self, row: usize) -> &Part<'a> {
+    pub fn part(&self, row: usize) -> &Part<'a> {
         &self.parts[self.position(row)]
     }
 
     /// The parts of a row and of the next one, if these differ.
     #[inline(always)]
-    pub fn both(&mut self, row: usize) -> (&mut Part<'a>, Option<&mut Part<'a>>) {
+    pub fn part_and_next(&mut self, row: usize) -> (&mut Part<'a>, Option<&mut Part<'a>>) {
         let (own, next) = (self.position(row), self.position(row + 1));
         if own == next {
             (&mut self.parts[own], None)

@@ -3,28 +3,28 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::band_views::{BEYOND, Copy, Part, Parts};
-use super::buffers::Rows;
+use super::band_views::{BEYOND, BandView, Part, RowCopies};
+use super::buffers::RowBuffers;
 use super::filling::Filling;
-use super::{Ground, Stepped};
+use super::{StepInputs, StepResults};
 use crate::shallow::columns::{Columns, STRIP, strip_of};
 use crate::shallow::solver::full::SLACK;
 use crate::shallow::solver::transfers::scale;
 use crate::shallow::solver::viscous_flux::Step;
 
 /// Minimum columns for a step to be divided among threads: below, starting them takes longer than they save.
-pub const LEAST_COLUMNS: usize = 100_000;
+pub const MIN_COLUMNS: usize = 100_000;
 /// Minimum rows of a band, to limit the work that neighbouring bands both do.
-const LEAST_ROWS: usize = 32;
+const MIN_ROWS: usize = 32;
 
 /// A band of rows and its buffers.
 #[derive(Debug, Clone)]
 struct Band {
     rows: Range<usize>,
-    buffers: Rows,
-    before: Copy,
-    behind: Copy,
-    stepped: Stepped,
+    buffers: RowBuffers,
+    before: RowCopies,
+    behind: RowCopies,
+    results: StepResults,
 }
 
 /// The bands of a domain.
@@ -42,7 +42,7 @@ pub struct Bands {
     /// Whether each row might have full columns.
     may_be_full: Vec<bool>,
     /// Bound of a column's inflow, in multiples of the maximum of its own depth and those beside it.
-    takes: i64,
+    inflow_bound: i64,
     /// Count of scalars that the liquid carries.
     scalars: usize,
 }
@@ -58,7 +58,7 @@ impl Bands {
             may_fill: vec![false; count],
             room: vec![0.0; count],
             may_be_full: vec![false; count],
-            takes: pipes as i64 + 1,
+            inflow_bound: pipes as i64 + 1,
             scalars: 0,
         };
         bands.divide(columns, 1);
@@ -67,7 +67,7 @@ impl Bands {
 
     /// Memory (bytes).
     pub fn bytes(&self) -> usize {
-        let woken = |band: &Band| band.stepped.woken.capacity() * size_of::<u32>();
+        let woken = |band: &Band| band.results.woken.capacity() * size_of::<u32>();
         let bands: usize = self.list.iter().map(|band| band.buffers.bytes() + woken(band)).sum();
         bands
             + size_of_val(&self.clearance[..])
@@ -79,7 +79,7 @@ impl Bands {
     /// Divides the rows among so many threads by their columns, unless they are already.
     pub fn divide(&mut self, columns: &Columns, threads: usize) {
         let rows = columns.grid.size[1];
-        let wanted = if columns.len() < LEAST_COLUMNS { 1 } else { threads.min(rows / LEAST_ROWS).max(1) };
+        let wanted = if columns.len() < MIN_COLUMNS { 1 } else { threads.min(rows / MIN_ROWS).max(1) };
         if self.list.len() == wanted {
             return;
         }
@@ -91,25 +91,25 @@ impl Bands {
             } else {
                 // Ends where its share of the strips does, but leaves each band the minimum count of rows.
                 let before = strips * (number + 1) / wanted;
-                let left = (wanted - 1 - number) * LEAST_ROWS;
+                let reserved = (wanted - 1 - number) * MIN_ROWS;
                 let even = (0..rows).find(|&row| columns.row(row).end >= before).unwrap_or(rows);
-                even.clamp(start + LEAST_ROWS, rows - left)
+                even.clamp(start + MIN_ROWS, rows - reserved)
             };
             let rows = start..end;
             start = end;
             Band {
                 rows,
-                buffers: Rows::new(columns, scalars),
-                before: Copy::default(),
-                behind: Copy::default(),
-                stepped: Stepped { woken: Vec::with_capacity(strips), ..Stepped::default() },
+                buffers: RowBuffers::new(columns, scalars),
+                before: RowCopies::default(),
+                behind: RowCopies::default(),
+                results: StepResults { woken: Vec::with_capacity(strips), ..StepResults::default() },
             }
         };
         self.list = (0..wanted).map(band).collect();
     }
 
     /// Makes buffers for liquid with so many scalars.
-    pub fn carry(&mut self, columns: &Columns, scalars: usize) {
+    pub fn set_scalar_count(&mut self, columns: &Columns, scalars: usize) {
         let threads = self.list.len();
         self.scalars = scalars;
         self.list.clear();
@@ -118,7 +118,7 @@ impl Bands {
 
     /// Measures rows again after their columns have changed.
     pub fn refit(&mut self, columns: &Columns, pipes: usize, rows: Range<usize>, depth: &[i32]) {
-        self.takes = pipes as i64 + 1;
+        self.inflow_bound = pipes as i64 + 1;
         for row in rows.clone() {
             self.clearance[row] = clearance(columns, row);
             let depths = &depth[super::band_views::indices(columns, &(row..row + 1))];
@@ -126,7 +126,7 @@ impl Bands {
         }
         for band in &mut self.list {
             band.buffers.widen(columns, rows.clone());
-            band.stepped.woken.reserve(columns.strips().len());
+            band.results.woken.reserve(columns.strips().len());
         }
     }
 
@@ -161,7 +161,7 @@ impl Bands {
         for row in 0..self.deepest.len() {
             let around = row.saturating_sub(1)..(row + 2).min(self.deepest.len());
             let deepest = self.deepest[around].iter().copied().max().unwrap_or(0);
-            self.may_fill[row] = self.takes * i64::from(deepest) > i64::from(self.clearance[row]);
+            self.may_fill[row] = self.inflow_bound * i64::from(deepest) > i64::from(self.clearance[row]);
             self.room[row] = scale::room(0, self.clearance[row], self.deepest[row]);
             self.may_be_full[row] = self.deepest[row] >= self.clearance[row] - self.clearance[row] / SLACK;
             any |= self.may_fill[row];
@@ -169,49 +169,49 @@ impl Bands {
         any
     }
 
-    /// One step; sets the rows of `ground` that may fill.
-    pub fn step(&mut self, step: &Step, ground: &Ground, liquid: Part) {
+    /// One step; sets the rows of `inputs` that may fill.
+    pub fn step(&mut self, step: &Step, inputs: &StepInputs, liquid: Part) {
         let Self { list, deepest, may_fill, room, .. } = self;
-        let ground = Ground { may_fill, room, ..*ground };
-        let (columns, links) = (ground.columns, &ground.pipes.links);
+        let inputs = StepInputs { may_fill, room, ..*inputs };
+        let (columns, links) = (inputs.columns, &inputs.pipes.links);
         let rows = columns.grid.size[1];
         for band in &mut *list {
             let Range { start, end } = band.rows;
             band.before.take(columns, links, start.saturating_sub(BEYOND)..start, &liquid);
             band.behind.take(columns, links, end..(end + BEYOND).min(rows), &liquid);
         }
-        run(list, step, &ground, liquid, deepest);
+        run(list, step, &inputs, liquid, deepest);
     }
 
     /// Whether a step is divided.
-    pub fn are_several(&self) -> bool {
+    pub fn is_divided(&self) -> bool {
         self.list.len() > 1
     }
 
     /// The results of the bands, in order.
-    pub fn results(&mut self) -> impl Iterator<Item = &mut Stepped> {
-        self.list.iter_mut().map(|band| &mut band.stepped)
+    pub fn results(&mut self) -> impl Iterator<Item = &mut StepResults> {
+        self.list.iter_mut().map(|band| &mut band.results)
     }
 }
 
 /// Runs bands in parallel.
-fn run(bands: &mut [Band], step: &Step, ground: &Ground, liquid: Part, deepest: &mut [i32]) {
+fn run(bands: &mut [Band], step: &Step, inputs: &StepInputs, liquid: Part, deepest: &mut [i32]) {
     match bands {
         [] => {}
         [band] => {
-            let (columns, links) = (ground.columns, &ground.pipes.links);
+            let (columns, links) = (inputs.columns, &inputs.pipes.links);
             let (before, behind) = (band.before.part(columns, links), band.behind.part(columns, links));
-            let mut parts = Parts::new(band.rows.clone(), before, liquid, behind);
-            band.buffers.step(step, ground, &mut parts, deepest, &mut band.stepped);
+            let mut view = BandView::new(band.rows.clone(), before, liquid, behind);
+            band.buffers.step(step, inputs, &mut view, deepest, &mut band.results);
         }
         _ => {
             let (first, others) = bands.split_at_mut(bands.len() / 2);
             let (row, start) = (others[0].rows.start, first[0].rows.start);
-            let [low, high] = liquid.split(ground.columns, &ground.pipes.links, row);
+            let [low, high] = liquid.split(inputs.columns, &inputs.pipes.links, row);
             let (deepest_low, deepest_high) = deepest.split_at_mut(row - start);
             rayon::join(
-                || run(first, step, ground, low, deepest_low),
-                || run(others, step, ground, high, deepest_high),
+                || run(first, step, inputs, low, deepest_low),
+                || run(others, step, inputs, high, deepest_high),
             );
         }
     }
@@ -219,19 +219,19 @@ fn run(bands: &mut [Band], step: &Step, ground: &Ground, liquid: Part, deepest: 
 
 /// Runs the steps of a frame while the other threads of the pool stay awake for their bands: waking a thread takes longer than one band of
 /// a step. If no thread is free, the frame's own thread does all the work.
-pub fn attended<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
+pub fn with_spinning_threads<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
     let done = AtomicBool::new(false);
     let ended = &done;
     let work = move || {
         // Also set if the work panics.
-        let _end = End(ended);
+        let _end = SetOnDrop(ended);
         work()
     };
-    rayon::join(work, || attend(threads.saturating_sub(1), ended)).0
+    rayon::join(work, || spin_until_done(threads.saturating_sub(1), ended)).0
 }
 
 /// Runs jobs of the pool, on so many threads, until the frame is done.
-fn attend(threads: usize, ended: &AtomicBool) {
+fn spin_until_done(threads: usize, ended: &AtomicBool) {
     let wait = || {
         while !ended.load(Ordering::Acquire) {
             if rayon::yield_now() != Some(rayon::Yield::Executed) {
@@ -240,16 +240,16 @@ fn attend(threads: usize, ended: &AtomicBool) {
         }
     };
     if threads > 1 {
-        rayon::join(wait, || attend(threads - 1, ended));
+        rayon::join(wait, || spin_until_done(threads - 1, ended));
     } else {
         wait();
     }
 }
 
 /// Sets a flag when it is dropped.
-struct End<'a>(&'a AtomicBool);
+struct SetOnDrop<'a>(&'a AtomicBool);
 
-impl Drop for End<'_> {
+impl Drop for SetOnDrop<'_> {
     fn drop(&mut self) {
         self.0.store(true, Ordering::Release);
     }
@@ -257,7 +257,7 @@ impl Drop for End<'_> {
 
 /// Minimum height between base and ceiling of a row's columns (units).
 fn clearance(columns: &Columns, row: usize) -> i32 {
-    let mut least = i32::MAX;
+    let mut clearance = i32::MAX;
     for strip in columns.row(row) {
         let present = columns.present(strip);
         let (base, ceiling) = (strip_of(columns.bases(), strip), strip_of(columns.ceilings(), strip));
@@ -265,8 +265,8 @@ fn clearance(columns: &Columns, row: usize) -> i32 {
             // A column without any room is a wall.
             let is_room = present >> x & 1 == 1 && ceiling[x] > base[x];
             let room = if is_room { ceiling[x] - base[x] } else { i32::MAX };
-            least = least.min(room);
+            clearance = clearance.min(room);
         }
     }
-    least
+    clearance
 }

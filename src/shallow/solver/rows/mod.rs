@@ -10,96 +10,97 @@ pub(super) mod band_views;
 pub(in crate::shallow) mod bands;
 pub(super) mod buffers;
 pub(super) mod filling;
-mod ground;
 pub(super) mod positions;
+mod step_inputs;
 
 use super::link_step::{Outside, indices_of};
-use super::pressurised::edges::At;
-use super::transfers::inflow_limit::most_through_links;
+use super::pressurised::edges::PipeIndex;
+use super::transfers::inflow_limit::max_link_inflow;
 use super::transfers::scale;
 use super::transfers::whole_units::{find_woken, move_units};
-use super::viscous_flux::{Carried, Kind, Row, Step, by_kind, flux_row, max, solved_row};
+use super::viscous_flux::{PipeState, Row, Step, StepKind, by_kind, flux_row, max, solved_row};
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{NONE, STRIP};
 use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::scalars::amounts::Changes;
-use band_views::Parts;
-use buffers::{Buffer, RING, Rows, SWEEPS};
-pub(super) use ground::each_link;
-pub use ground::{Ground, Stepped};
-use positions::{PAD, Place};
+use band_views::BandView;
+use buffers::{Buffer, RING, RowBuffers, SWEEPS};
+use positions::{PAD, RowPositions};
+pub(super) use step_inputs::for_each_link_end;
+pub use step_inputs::{StepInputs, StepResults};
 
-impl Rows {
+impl RowBuffers {
     /// One step of a band of rows; `deepest` receives the maximum depth of each (units).
     pub fn step(
         &mut self,
         step: &Step,
-        ground: &Ground,
-        parts: &mut Parts,
+        inputs: &StepInputs,
+        view: &mut BandView,
         deepest: &mut [i32],
-        stepped: &mut Stepped,
+        results: &mut StepResults,
     ) {
         let rows = self;
-        by_kind!(step, K => dispatch!(Rows::run::<K>(
-            rows: &mut Rows, step: &Step, ground: &Ground, parts: &mut Parts, deepest: &mut [i32], stepped: &mut Stepped
+        by_kind!(step, K => dispatch!(RowBuffers::run::<K>(
+            rows: &mut RowBuffers, step: &Step, inputs: &StepInputs, view: &mut BandView, deepest: &mut [i32], results: &mut StepResults
         )))
     }
 
     #[inline(always)]
-    fn run<K: Kind>(
+    fn run<K: StepKind>(
         &mut self,
         step: &Step,
-        ground: &Ground,
-        parts: &mut Parts,
+        inputs: &StepInputs,
+        view: &mut BandView,
         deepest: &mut [i32],
-        stepped: &mut Stepped,
+        results: &mut StepResults,
     ) {
-        let count = ground.columns.grid.size[1];
-        let behind = if ground.may_fill.contains(&true) { 1 + SWEEPS } else { 1 };
-        let own = parts.rows.clone();
-        let start = own.start.saturating_sub(1 + behind);
+        let count = inputs.columns.grid.size[1];
+        // Distance from the front to the row whose transfers are final.
+        let lag = if inputs.may_fill.contains(&true) { 1 + SWEEPS } else { 1 };
+        let own = view.rows.clone();
+        let start = own.start.saturating_sub(1 + lag);
         let mut idle = 0;
-        for front in start..own.end + behind {
-            idle = if ground.is_idle(front) { idle + 1 } else { 0 };
-            if idle > behind + 1 {
+        for front in start..own.end + lag {
+            idle = if inputs.is_idle(front) { idle + 1 } else { 0 };
+            if idle > lag + 1 {
                 self.ring[front % RING].clear();
-                if let Some(row) = front.checked_sub(behind).filter(|row| own.contains(row)) {
-                    deepest[row - own.start] = ground.active.asleep_depth(row);
+                if let Some(row) = front.checked_sub(lag).filter(|row| own.contains(row)) {
+                    deepest[row - own.start] = inputs.active.asleep_depth(row);
                 }
                 continue;
             }
             if front < count {
-                let is_held = self.drive::<K>(step, ground, parts, front);
-                stepped.scaled[2] += u32::from(is_held && own.contains(&front));
-                if !ground.network.is_empty() {
-                    self.shut(ground, parts, front);
+                let is_limited = self.find_fluxes::<K>(step, inputs, view, front);
+                results.scaled[2] += u32::from(is_limited && own.contains(&front));
+                if !inputs.network.is_empty() {
+                    self.apply_network(inputs, view, front);
                 }
-                if !self.carried.is_empty() {
-                    self.carried.find_levels(ground, parts, front);
+                if !self.scalars.is_empty() {
+                    self.scalars.find_levels(inputs, view, front);
                 }
-                let over = self.find_least(ground, parts, front);
-                stepped.scaled[0] += u32::from(over && own.contains(&front));
+                let is_over = self.find_k_min(inputs, view, front);
+                results.scaled[0] += u32::from(is_over && own.contains(&front));
             }
             // The row at a distance behind the front, if the band includes it.
             let at = |distance: usize| front.checked_sub(distance).filter(|row| (start..count).contains(row));
             if let Some(row) = at(1) {
-                self.scale::<true>(ground, parts, row);
+                self.scale::<true>(inputs, view, row);
             }
-            if let Some(row) = at(1).filter(|_| behind > 1) {
-                let is_full = self.find_most(ground, parts, row);
-                stepped.scaled[1] += u32::from(is_full && own.contains(&row));
+            if let Some(row) = at(1).filter(|_| lag > 1) {
+                let is_full = self.find_k_max(inputs, view, row);
+                results.scaled[1] += u32::from(is_full && own.contains(&row));
             }
-            if let Some(row) = at(2).filter(|_| behind > 1) {
-                self.find_more(ground, parts, row);
+            if let Some(row) = at(2).filter(|_| lag > 1) {
+                self.refine_k_max(inputs, view, row);
             }
-            if let Some(row) = at(behind).filter(|row| row + 1 >= own.start) {
-                self.scale::<false>(ground, parts, row);
-                self.move_links(ground, parts, row, &mut stepped.outside);
+            if let Some(row) = at(lag).filter(|row| row + 1 >= own.start) {
+                self.scale::<false>(inputs, view, row);
+                self.move_links(inputs, view, row, &mut results.outside);
                 if own.contains(&row) {
-                    deepest[row - own.start] = self.transfer(ground, parts, row, &mut stepped.woken);
+                    deepest[row - own.start] = self.apply_transfers(inputs, view, row, &mut results.woken);
                 }
-                if !self.carried.is_empty() {
-                    self.carry(ground, parts, row, &mut stepped.carried);
+                if !self.scalars.is_empty() {
+                    self.move_scalars(inputs, view, row, &mut results.scalar_changes);
                 }
             }
         }
@@ -107,16 +108,24 @@ impl Rows {
 
     /// Computes the fluxes of a row's pipes; returns whether fast films were limited.
     #[inline(always)]
-    fn drive<K: Kind>(&mut self, step: &Step, ground: &Ground, parts: &mut Parts, row: usize) -> bool {
-        let Ground { columns, pipes, active, fast, .. } = ground;
+    fn find_fluxes<K: StepKind>(
+        &mut self,
+        step: &Step,
+        inputs: &StepInputs,
+        view: &mut BandView,
+        row: usize,
+    ) -> bool {
+        let StepInputs { columns, pipes, active, fast, .. } = inputs;
         let (light, is_fast) = (&fast.light, fast.row(row));
-        let (walls, is_walled) = (ground.walls, K::VISCOUS && !K::WHOLE && ground.walls.row(row));
+        let (friction, has_friction) =
+            (inputs.friction, K::VISCOUS && !K::WHOLE && inputs.friction.includes_row(row));
         let start = columns.row(row).start * STRIP;
         let buffer = &mut self.ring[row % RING];
         buffer.clear();
-        let (own, beyond) = parts.both(row);
-        let ([flux_east, flux_south], [left_east, left_south]) = (&mut own.flux, &mut own.left);
-        let (mut end, mut is_held) = (0, false);
+        let (own, beyond) = view.part_and_next(row);
+        let ([flux_east, flux_south], [remainder_east, remainder_south]) =
+            (&mut own.flux, &mut own.remainder);
+        let (mut end, mut is_limited) = (0, false);
         for span in active.row(row) {
             let at = PAD + span.first as usize - start;
             if at != end {
@@ -149,24 +158,24 @@ impl Rows {
                     is_light: &fast.strips[first / STRIP..],
                 };
                 let (mine, at) = (mine..mine + len, at..at + len);
-                let carried = Carried {
+                let state = PipeState {
                     flux: [&mut flux_east[mine.clone()], &mut flux_south[mine.clone()]],
-                    left: [&mut left_east[mine.clone()], &mut left_south[mine]],
+                    remainder: [&mut remainder_east[mine.clone()], &mut remainder_south[mine]],
                     transfer: [&mut buffer.east[at.clone()], &mut buffer.south[at]],
                 };
-                if is_walled {
-                    let solved = walls.solved().map(|flux| &flux[first..]);
+                if has_friction {
+                    let solved = friction.solved().map(|flux| &flux[first..]);
                     if is_fast {
-                        is_held |= solved_row::<true>(step, &row, solved, carried);
+                        is_limited |= solved_row::<true>(step, &row, solved, state);
                     } else {
-                        solved_row::<false>(step, &row, solved, carried);
+                        solved_row::<false>(step, &row, solved, state);
                     }
                 } else {
-                    is_held |= match (K::VISCOUS && !K::WHOLE && is_fast, ground.may_rest) {
-                        (true, true) => flux_row::<K, true, true>(step, &row, carried),
-                        (true, false) => flux_row::<K, true, false>(step, &row, carried),
-                        (false, true) => flux_row::<K, false, true>(step, &row, carried),
-                        (false, false) => flux_row::<K, false, false>(step, &row, carried),
+                    is_limited |= match (K::VISCOUS && !K::WHOLE && is_fast, inputs.may_rest) {
+                        (true, true) => flux_row::<K, true, true>(step, &row, state),
+                        (true, false) => flux_row::<K, true, false>(step, &row, state),
+                        (false, true) => flux_row::<K, false, true>(step, &row, state),
+                        (false, false) => flux_row::<K, false, false>(step, &row, state),
                     };
                 }
             }
@@ -177,45 +186,45 @@ impl Rows {
                 Some((start, depth)) if index >= start => depth[index - start],
                 _ => own.depth[index - own.start],
             };
-            own.links.drive::<K>(step, columns, ground.links_of(row), depth);
+            own.links.find_fluxes::<K>(step, columns, inputs.links_of(row), depth);
         }
-        is_held
+        is_limited
     }
 
-    /// Moves the units of the flooded pipes (the network of `pressurised`) in a row, after the fluxes of that row, and closes the network's
-    /// pipes there for the rest of the step.
-    fn shut(&mut self, ground: &Ground, parts: &mut Parts, row: usize) {
-        let (position, buffer) = (Place::new(ground.columns, row), &mut self.ring[row % RING]);
-        let part = parts.of(row);
+    /// Moves the units of the network of full columns in a row, after the fluxes of that row, and closes its pipes there for the rest of
+    /// the step.
+    fn apply_network(&mut self, inputs: &StepInputs, view: &mut BandView, row: usize) {
+        let (position, buffer) = (RowPositions::new(inputs.columns, row), &mut self.ring[row % RING]);
+        let part = view.part_mut(row);
         let (start, first_link) = (part.start, part.links.first);
         let (depth, transfer) = (&mut *part.depth, &mut *part.links.transfer);
-        ground.network.move_units(
-            &indices_of(ground.columns, row),
-            &ground.pipes.links.row(row),
+        inputs.network.move_units(
+            &indices_of(inputs.columns, row),
+            &inputs.pipes.links.row(row),
             |column, units| depth[column as usize - start] += units,
             |at| match at {
-                At::East(column) => buffer.east[position.of(column)] = 0.0,
-                At::South(column) => buffer.south[position.of(column)] = 0.0,
-                At::Link(link) => transfer[link as usize - first_link] = 0.0,
+                PipeIndex::East(column) => buffer.east[position.of(column)] = 0.0,
+                PipeIndex::South(column) => buffer.south[position.of(column)] = 0.0,
+                PipeIndex::Link(link) => transfer[link as usize - first_link] = 0.0,
             },
         );
     }
 
     /// Finds K_min of a row's columns; returns whether any is not 1.
     #[inline(always)]
-    fn find_least(&mut self, ground: &Ground, parts: &Parts, row: usize) -> bool {
-        let Ground { columns, pipes, active, .. } = ground;
-        let part = parts.see(row);
+    fn find_k_min(&mut self, inputs: &StepInputs, view: &BandView, row: usize) -> bool {
+        let StepInputs { columns, pipes, active, .. } = inputs;
+        let part = view.part(row);
         let [own, north] =
             self.ring.get_disjoint_mut([row % RING, (row + RING - 1) % RING]).expect("two rows");
-        let position = Place::new(columns, row);
-        let (mut over, may_fill, mut into) = (false, ground.may_fill[row], [0.0; STRIP]);
+        let position = RowPositions::new(columns, row);
+        let (mut may_exceed, may_fill, mut into) = (false, inputs.may_fill[row], [0.0; STRIP]);
         for span in active.row(row) {
             let (at, len) = (position.of(span.first), span.len as usize);
             let around = position.around(&own.east, &own.south, &north.south, &self.zeros, span);
             let depth = &part.depth[span.first as usize - part.start..];
-            let out = &mut own.least[at..at + len];
-            over |= if may_fill {
+            let out = &mut own.k_min[at..at + len];
+            may_exceed |= if may_fill {
                 scale::outflow::<true>(depth, &around, out, &mut into)
             } else {
                 scale::outflow::<false>(depth, &around, out, &mut into)
@@ -223,49 +232,49 @@ impl Rows {
         }
         if !pipes.links.columns_of(row).is_empty() {
             let sums = &mut self.linked;
-            each_link(ground, parts, row, true, |column, units| sums[position.of(column)] += units);
+            for_each_link_end(inputs, view, row, true, |column, units| sums[position.of(column)] += units);
             for &column in pipes.links.columns_of(row) {
-                own.least[position.of(column)] += std::mem::take(&mut sums[position.of(column)]) as f32;
+                own.k_min[position.of(column)] += std::mem::take(&mut sums[position.of(column)]) as f32;
             }
             // Few columns have links, but any of these may now exceed its depth.
-            over = true;
+            may_exceed = true;
         }
         if may_fill {
-            let linked = most_through_links(ground, parts, row, &mut self.linked);
+            let linked = max_link_inflow(inputs, view, row, &mut self.linked);
             own.may_fill =
-                into.into_iter().fold(0.0, max) + linked > ground.room[row] || !ground.network.is_empty();
+                into.into_iter().fold(0.0, max) + linked > inputs.room[row] || !inputs.network.is_empty();
         }
-        let mut is_less = false;
-        if over {
+        let mut has_k_min = false;
+        if may_exceed {
             for span in active.row(row) {
                 let (at, len) = (position.of(span.first), span.len as usize);
                 let depth = &part.depth[span.first as usize - part.start..];
-                is_less |= scale::least(depth, &mut own.least[at..at + len]) < 1.0;
+                has_k_min |= scale::find_k_min(depth, &mut own.k_min[at..at + len]) < 1.0;
             }
         }
-        own.is_less = is_less;
-        is_less
+        own.has_k_min = has_k_min;
+        has_k_min
     }
 
     /// Multiplies a row's transfers by K_min of the donors (`GIVES`), or by K_max of the receivers.
     #[inline(always)]
-    fn scale<const GIVES: bool>(&mut self, ground: &Ground, parts: &mut Parts, row: usize) {
+    fn scale<const GIVES: bool>(&mut self, inputs: &StepInputs, view: &mut BandView, row: usize) {
         let [own, south] = self.ring.get_disjoint_mut([row % RING, (row + 1) % RING]).expect("two rows");
-        let has_south = row + 1 < ground.columns.grid.size[1];
+        let has_south = row + 1 < inputs.columns.grid.size[1];
         let (is_scaled, south_is_scaled, own_factors, south_factors) = if GIVES {
-            (own.is_less, has_south && south.is_less, &own.least, &south.least)
+            (own.has_k_min, has_south && south.has_k_min, &own.k_min, &south.k_min)
         } else {
-            (own.is_full, has_south && south.is_full, &own.most[1], &south.most[1])
+            (own.has_k_max, has_south && south.has_k_max, &own.k_max[1], &south.k_max[1])
         };
         if !is_scaled && !south_is_scaled {
             return;
         }
         let factors = if is_scaled { own_factors } else { &self.ones };
         let beyond = if south_is_scaled { south_factors } else { &self.ones };
-        let position = Place::new(ground.columns, row);
-        let part = parts.of(row);
+        let position = RowPositions::new(inputs.columns, row);
+        let part = view.part_mut(row);
         let [flux_east, flux_south] = &mut part.flux;
-        for span in ground.active.row(row) {
+        for span in inputs.active.row(row) {
             let (at, len) = (position.of(span.first), span.len as usize);
             let mine = span.first as usize - part.start;
             let factor = position.beside(factors, beyond, &self.ones, span);
@@ -278,22 +287,22 @@ impl Rows {
             );
         }
         let factor = |column| position.pick(factors, beyond, column);
-        part.links.scale(ground.links_of(row), GIVES, factor);
+        part.links.scale(inputs.links_of(row), GIVES, factor);
     }
 
     /// Applies the transfers of a row's links to the band's own columns.
-    fn move_links(&self, ground: &Ground, parts: &mut Parts, row: usize, outside: &mut Outside) {
-        if ground.pipes.links.row(row).is_empty() {
+    fn move_links(&self, inputs: &StepInputs, view: &mut BandView, row: usize, outside: &mut Outside) {
+        if inputs.pipes.links.row(row).is_empty() {
             return;
         }
-        let is_own = parts.rows.contains(&row);
-        let own = band_views::indices(ground.columns, &parts.rows);
+        let is_own = view.rows.contains(&row);
+        let own = band_views::indices(inputs.columns, &view.rows);
         let mut elsewhere = Outside::default();
         let outside = if is_own { outside } else { &mut elsewhere };
-        let (part, next) = parts.both(row);
+        let (part, next) = view.part_and_next(row);
         let (start, depth) = (part.start, &mut *part.depth);
         let mut next = next.map(|next| (next.start, &mut *next.depth));
-        part.links.move_units(ground.links_of(row), outside, |column, units| {
+        part.links.move_units(inputs.links_of(row), outside, |column, units| {
             if own.contains(&column) {
                 match &mut next {
                     Some((start, depth)) if column >= *start => depth[column - *start] += units,
@@ -305,35 +314,41 @@ impl Rows {
 
     /// Applies a row's transfers; returns its maximum new depth.
     #[inline(always)]
-    fn transfer(&mut self, ground: &Ground, parts: &mut Parts, row: usize, woken: &mut Vec<u32>) -> i32 {
+    fn apply_transfers(
+        &mut self,
+        inputs: &StepInputs,
+        view: &mut BandView,
+        row: usize,
+        woken: &mut Vec<u32>,
+    ) -> i32 {
         let [own, north] =
             self.ring.get_disjoint_mut([row % RING, (row + RING - 1) % RING]).expect("two rows");
-        let position = Place::new(ground.columns, row);
-        let part = parts.of(row);
+        let position = RowPositions::new(inputs.columns, row);
+        let part = view.part_mut(row);
         let mut deepest = [0; STRIP];
-        for span in ground.active.row(row) {
+        for span in inputs.active.row(row) {
             let (mine, len) = (span.first as usize - part.start, span.len as usize);
             let around = position.around(&own.east, &own.south, &north.south, &self.zeros, span);
             let depth = &mut part.depth[mine..mine + len];
             move_units(&around, depth, &mut deepest);
             let strip = span.first / STRIP as u32;
-            let marks = [&ground.active.wet, &ground.active.moving].map(|marks| &marks[strip as usize..]);
+            let marks = [&inputs.active.wet, &inputs.active.moving].map(|marks| &marks[strip as usize..]);
             find_woken(&around, depth, marks, |position| woken.push(strip + position as u32));
         }
-        deepest.into_iter().fold(ground.active.asleep_depth(row), i32::max)
+        deepest.into_iter().fold(inputs.active.asleep_depth(row), i32::max)
     }
 
     /// Moves the scalars of a row's transfers; its depths are final.
-    fn carry(
+    fn move_scalars(
         &mut self,
-        ground: &Ground,
-        parts: &mut Parts,
+        inputs: &StepInputs,
+        view: &mut BandView,
         row: usize,
         changes: &mut [Changes; MAX_SCALARS],
     ) {
-        let Self { carried, ring, .. } = self;
+        let Self { scalars, ring, .. } = self;
         let Buffer { east, south, .. } = &ring[row % RING];
-        carried.move_links(ground, parts, row, changes);
-        carried.move_row(ground, parts, row, [east, south], changes);
+        scalars.move_links(inputs, view, row, changes);
+        scalars.move_row(inputs, view, row, [east, south], changes);
     }
 }

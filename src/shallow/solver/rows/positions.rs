@@ -8,12 +8,12 @@ use crate::shallow::solver::transfers::scale::{Around, Beside};
 pub const PAD: usize = STRIP;
 
 /// Positions of the columns of a row, and of the rows beside it, in their buffers.
-pub struct Place {
+pub struct RowPositions {
     /// First index of the row before, of the row itself, and of the row behind.
     starts: [usize; 3],
 }
 
-impl Place {
+impl RowPositions {
     /// Positions for a row.
     #[inline(always)]
     pub fn new(columns: &Columns, row: usize) -> Self {

@@ -25,27 +25,27 @@ pub(in crate::shallow::solver) struct Party {
 }
 
 /// Limits the units of transfers, unless it is stopped.
-pub(in crate::shallow::solver) fn settle(parties: &mut [Party], edges: &mut [Edge], stop: &Stop) {
+pub(in crate::shallow::solver) fn limit(parties: &mut [Party], edges: &mut [Edge], stop: &Stop) {
     count(parties, edges);
     for edge in edges.iter_mut() {
-        if let Some(giver) = parties.get(edge.ends[usize::from(edge.units < 0)] as usize)
-            && giver.gives > giver.has
+        if let Some(donor) = parties.get(edge.ends[usize::from(edge.units < 0)] as usize)
+            && donor.gives > donor.has
         {
-            edge.units = share(edge.units, giver.has, giver.gives);
+            edge.units = share(edge.units, donor.has, donor.gives);
         }
     }
     for round in 0.. {
         count(parties, edges);
-        if parties.iter().all(|party| party.takes - party.gives <= party.room) || stop.is_asked() {
+        if parties.iter().all(|party| party.takes - party.gives <= party.room) || stop.is_requested() {
             return;
         }
         for edge in edges.iter_mut() {
-            let taker = edge.ends[usize::from(edge.units > 0)];
-            if let Some(taker) = parties.get(taker as usize).filter(|_| taker != NONE)
-                && taker.takes - taker.gives > taker.room
+            let receiver = edge.ends[usize::from(edge.units > 0)];
+            if let Some(receiver) = parties.get(receiver as usize).filter(|_| receiver != NONE)
+                && receiver.takes - receiver.gives > receiver.room
             {
-                let fits = if round < CUTS { taker.room + taker.gives } else { 0 };
-                edge.units = share(edge.units, fits, taker.takes);
+                let allowed = if round < CUTS { receiver.room + receiver.gives } else { 0 };
+                edge.units = share(edge.units, allowed, receiver.takes);
             }
         }
     }
@@ -61,11 +61,11 @@ fn count(parties: &mut [Party], edges: &[Edge]) {
         (party.gives, party.takes) = (0, 0);
     }
     for edge in edges.iter().filter(|edge| edge.units != 0) {
-        let giver = usize::from(edge.units < 0);
-        if let Some(party) = parties.get_mut(edge.ends[giver] as usize) {
+        let donor = usize::from(edge.units < 0);
+        if let Some(party) = parties.get_mut(edge.ends[donor] as usize) {
             party.gives += edge.units.abs();
         }
-        if let Some(party) = parties.get_mut(edge.ends[1 - giver] as usize) {
+        if let Some(party) = parties.get_mut(edge.ends[1 - donor] as usize) {
             party.takes += edge.units.abs();
         }
     }

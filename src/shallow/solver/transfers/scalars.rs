@@ -4,61 +4,61 @@
 //! It follows the rows of a step (`rows/`): first the levels of the row in front, then, when the transfers of a row are final, their
 //! amounts.
 
-use super::whole_units::take_along;
+use super::whole_units::find_moved_amounts;
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lists::refill;
 use crate::shallow::columns::{NONE, STRIP, strip_mut, strip_of};
 use crate::shallow::scalars::amounts::{Changes, LawEffect};
 use crate::shallow::scalars::shares::{LEVELS, MAX_SCALARS, integer, level, nearest, share};
 use crate::shallow::solver::overflow_edges::{Fall, OverflowEdges};
-use crate::shallow::solver::pressurised::edges::At;
+use crate::shallow::solver::pressurised::edges::PipeIndex;
 use crate::shallow::solver::pressurised::network::Network;
-use crate::shallow::solver::rows::Ground;
-use crate::shallow::solver::rows::band_views::{Parts, indices};
-use crate::shallow::solver::rows::buffers::{Lane, Lanes, RING};
-use crate::shallow::solver::rows::positions::Place;
+use crate::shallow::solver::rows::StepInputs;
+use crate::shallow::solver::rows::band_views::{BandView, indices};
+use crate::shallow::solver::rows::buffers::{RING, ScalarBuffers, ScalarRows};
+use crate::shallow::solver::rows::positions::RowPositions;
 
-impl Lanes {
+impl ScalarBuffers {
     /// For so many scalars, in rows of so many numbers.
     pub fn new(count: usize, room: usize) -> Self {
         let numbers = || vec![0.0; room];
-        let lane = |_| Lane {
+        let rows = |_| ScalarRows {
             level: std::array::from_fn(|_| numbers()),
             south: std::array::from_fn(|_| numbers()),
             east: numbers(),
         };
-        Self { lanes: (0..count).map(lane).collect(), none: if count > 0 { numbers() } else { Vec::new() } }
+        Self { list: (0..count).map(rows).collect(), zeros: if count > 0 { numbers() } else { Vec::new() } }
     }
 
     /// Whether there is no scalar.
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
-        self.lanes.is_empty()
+        self.list.is_empty()
     }
 
     /// Grows the buffers for rows of so many numbers.
     pub fn widen(&mut self, room: usize) {
-        for Lane { level, south, east } in &mut self.lanes {
+        for ScalarRows { level, south, east } in &mut self.list {
             level.iter_mut().chain(south).for_each(|numbers| numbers.resize(room, 0.0));
             east.resize(room, 0.0);
         }
-        if !self.lanes.is_empty() {
-            self.none.resize(room, 0.0);
+        if !self.list.is_empty() {
+            self.zeros.resize(room, 0.0);
         }
     }
 
     /// Memory (bytes).
     pub fn bytes(&self) -> usize {
-        (self.lanes.len() * (RING + 3) + 1) * size_of_val(&self.none[..])
+        (self.list.len() * (RING + 3) + 1) * size_of_val(&self.zeros[..])
     }
 
     /// Finds the concentrations in a row, from the depths that its transfers are scaled by.
     #[inline(never)]
-    pub fn find_levels(&mut self, ground: &Ground, parts: &Parts, row: usize) {
-        let (part, position) = (parts.see(row), Place::new(ground.columns, row));
-        for (lane, amounts) in self.lanes.iter_mut().zip(&part.amounts) {
-            let levels = &mut lane.level[row % RING];
-            for span in ground.active.row(row) {
+    pub fn find_levels(&mut self, inputs: &StepInputs, view: &BandView, row: usize) {
+        let (part, position) = (view.part(row), RowPositions::new(inputs.columns, row));
+        for (rows, amounts) in self.list.iter_mut().zip(&part.amounts) {
+            let levels = &mut rows.level[row % RING];
+            for span in inputs.active.row(row) {
                 let (at, mine, len) =
                     (position.of(span.first), span.first as usize - part.start, span.len as usize);
                 let own = mine..mine + len;
@@ -71,27 +71,27 @@ impl Lanes {
     #[inline(never)]
     pub fn move_links(
         &self,
-        ground: &Ground,
-        parts: &mut Parts,
+        inputs: &StepInputs,
+        view: &mut BandView,
         row: usize,
         changes: &mut [Changes; MAX_SCALARS],
     ) {
-        let links = &ground.pipes.links;
-        let (is_own, own) = (parts.rows.contains(&row), indices(ground.columns, &parts.rows));
-        let position = Place::new(ground.columns, row);
-        let (part, mut next) = parts.both(row);
-        for (scalar, lane) in self.lanes.iter().enumerate() {
-            let [levels, beyond] = [row, row + 1].map(|row| &lane.level[row % RING]);
+        let links = &inputs.pipes.links;
+        let (is_own, own) = (view.rows.contains(&row), indices(inputs.columns, &view.rows));
+        let position = RowPositions::new(inputs.columns, row);
+        let (part, mut next) = view.part_and_next(row);
+        for (scalar, rows) in self.list.iter().enumerate() {
+            let [levels, beyond] = [row, row + 1].map(|row| &rows.level[row % RING]);
             for link in links.row(row) {
                 // The same whole units that the liquid moves.
                 let units = part.links.transfer[link - part.links.first] as i32;
                 if units == 0 {
                     continue;
                 }
-                let (from, to, fall) = (links.from[link], links.to[link], ground.overflow_edges.at(link));
+                let (from, to, fall) = (links.from[link], links.to[link], inputs.overflow_edges.at(link));
                 // Liquid from outside has the concentrations of the liquid inside.
-                let giver = if units > 0 || to == NONE { from } else { to };
-                let moved = share(position.pick(levels, beyond, giver), f64::from(units));
+                let donor = if units > 0 || to == NONE { from } else { to };
+                let moved = share(position.pick(levels, beyond, donor), f64::from(units));
                 let mut change = |column: u32, amount: f64| {
                     let column = column as usize;
                     if own.contains(&column) {
@@ -105,7 +105,7 @@ impl Lanes {
                 };
                 if fall != Fall::No {
                     let fallen = if units > 0 { moved } else { -moved };
-                    change(giver, -fallen);
+                    change(donor, -fallen);
                     part.links.fallen[scalar][link - part.links.first] = fallen;
                     continue;
                 }
@@ -125,43 +125,48 @@ impl Lanes {
     #[inline(never)]
     pub fn move_row(
         &mut self,
-        ground: &Ground,
-        parts: &mut Parts,
+        inputs: &StepInputs,
+        view: &mut BandView,
         row: usize,
         [east, south]: [&[f32]; 2],
         changes: &mut [Changes; MAX_SCALARS],
     ) {
-        let is_own = parts.rows.contains(&row);
-        let (part, position) = (parts.of(row), Place::new(ground.columns, row));
-        let Self { lanes, none } = self;
-        for (scalar, (lane, effect)) in lanes.iter_mut().zip(ground.law_effects).enumerate() {
+        let is_own = view.rows.contains(&row);
+        let (part, position) = (view.part_mut(row), RowPositions::new(inputs.columns, row));
+        let Self { list, zeros } = self;
+        for (scalar, (rows, effect)) in list.iter_mut().zip(inputs.law_effects).enumerate() {
             let [levels, beyond] =
-                [&lane.level[row % RING], &lane.level[(row + 1) % RING]].map(|levels| &levels[..]);
-            let [own_south, north] = lane.south.get_disjoint_mut([row % 2, (row + 1) % 2]).expect("two rows");
-            for span in ground.active.row(row) {
+                [&rows.level[row % RING], &rows.level[(row + 1) % RING]].map(|levels| &levels[..]);
+            let [own_south, north] = rows.south.get_disjoint_mut([row % 2, (row + 1) % 2]).expect("two rows");
+            for span in inputs.active.row(row) {
                 let (at, len) = (position.of(span.first), span.len as usize);
-                let beside = position.beside(levels, beyond, none, span);
-                take_along(beside.own, beside.south, &south[at..], &mut own_south[at..at + len]);
+                let beside = position.beside(levels, beyond, zeros, span);
+                find_moved_amounts(beside.own, beside.south, &south[at..], &mut own_south[at..at + len]);
                 if is_own {
-                    take_along(beside.own, &beside.own[1..], &east[at..], &mut lane.east[at..at + len]);
+                    find_moved_amounts(
+                        beside.own,
+                        &beside.own[1..],
+                        &east[at..],
+                        &mut rows.east[at..at + len],
+                    );
                 }
             }
             if !is_own {
                 continue;
             }
             let (mut end, changes) = (0, &mut changes[scalar]);
-            for span in ground.active.row(row) {
+            for span in inputs.active.row(row) {
                 let (at, mine, len) =
                     (position.of(span.first), span.first as usize - part.start, span.len as usize);
                 if at != end {
-                    lane.east[at - 1] = 0.0;
+                    rows.east[at - 1] = 0.0;
                 }
                 end = at + len;
                 let around = [
-                    &lane.east[at..at + len],
-                    &lane.east[at - 1..at - 1 + len],
+                    &rows.east[at..at + len],
+                    &rows.east[at - 1..at - 1 + len],
                     &own_south[at..at + len],
-                    &position.north(north, none, span)[..len],
+                    &position.north(north, zeros, span)[..len],
                 ];
                 let (depth, amount) =
                     (&part.depth[mine..mine + len], &mut part.amounts[scalar][mine..mine + len]);
@@ -244,8 +249,8 @@ fn apply_law(effect: LawEffect, depth: &[i32], amount: &mut [f64]) -> i64 {
             let before = amount[x];
             let kept = before - nearest(before * effect.loses);
             let older = kept + depth * effect.grows;
-            let most = depth * LEVELS;
-            let now = if effect.grows > 0.0 && older > most { most } else { older };
+            let max = depth * LEVELS;
+            let now = if effect.grows > 0.0 && older > max { max } else { older };
             amount[x] = now;
             grown[x] += integer(now - before);
         }
@@ -255,7 +260,7 @@ fn apply_law(effect: LawEffect, depth: &[i32], amount: &mut [f64]) -> i64 {
 impl Network {
     /// Moves the scalars of the network's units, at the concentrations before the transfer; `depth` is also the one before. `fallen`
     /// receives what goes over overflow edges.
-    pub fn carry(
+    pub fn move_scalars(
         &self,
         depth: &[i32],
         (overflow_edges, fallen): (&OverflowEdges, &mut [f64]),
@@ -267,17 +272,17 @@ impl Network {
         refill(levels, self.parties.iter().map(|party| of(party.column)));
         for edge in self.edges.iter().filter(|edge| edge.units != 0) {
             let [from, to] = edge.ends;
-            if let At::Link(link) = edge.at
+            if let PipeIndex::Link(link) = edge.at
                 && overflow_edges.at(link as usize) != Fall::No
             {
-                let giver = if from == NONE { to } else { from } as usize;
-                let moved = share(levels[giver], edge.units.abs() as f64);
-                amounts[self.parties[giver].column as usize] -= moved;
+                let donor = if from == NONE { to } else { from } as usize;
+                let moved = share(levels[donor], edge.units.abs() as f64);
+                amounts[self.parties[donor].column as usize] -= moved;
                 fallen[link as usize] = moved;
                 continue;
             }
-            let giver = if edge.units > 0 || to == NONE { from } else { to };
-            let moved = share(levels[giver as usize], edge.units as f64);
+            let donor = if edge.units > 0 || to == NONE { from } else { to };
+            let moved = share(levels[donor as usize], edge.units as f64);
             amounts[self.parties[from as usize].column as usize] -= moved;
             match self.parties.get(to as usize) {
                 Some(party) => amounts[party.column as usize] += moved,

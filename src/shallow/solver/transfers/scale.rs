@@ -83,20 +83,20 @@ fn outflow_of<const FILLS: bool>(
 
 /// Turns the outflow of each column into K_min; returns the minimum.
 #[inline(always)]
-pub fn least(depth: &[i32], out: &mut [f32]) -> f32 {
-    let mut least = [1.0; STRIP];
+pub fn find_k_min(depth: &[i32], out: &mut [f32]) -> f32 {
+    let mut minimum = [1.0; STRIP];
     for strip in 0..out.len() / STRIP {
-        least_of(strip_of(depth, strip), strip_mut(out, strip), &mut least);
+        k_min_of(strip_of(depth, strip), strip_mut(out, strip), &mut minimum);
     }
-    least.into_iter().fold(1.0, min)
+    minimum.into_iter().fold(1.0, min)
 }
 
 #[inline(always)]
-fn least_of(depth: &[i32; STRIP], out: &mut [f32; STRIP], least: &mut [f32; STRIP]) {
+fn k_min_of(depth: &[i32; STRIP], out: &mut [f32; STRIP], minimum: &mut [f32; STRIP]) {
     for x in 0..STRIP {
         let spare = spare(depth[x]);
         out[x] = if out[x] > spare { spare / out[x] } else { 1.0 };
-        least[x] = min(out[x], least[x]);
+        minimum[x] = min(out[x], minimum[x]);
     }
 }
 
@@ -164,25 +164,25 @@ pub fn room(base: i32, ceiling: i32, depth: i32) -> f32 {
 
 /// K_max of a column, from its inflow and its room.
 #[inline(always)]
-pub fn most(into: f32, room: f32) -> f32 {
+pub fn k_max(into: f32, room: f32) -> f32 {
     if into > room { room / into } else { 1.0 }
 }
 
 /// Turns the inflow of each column into K_max, as if nothing flowed out; returns the minimum.
 #[inline(always)]
-pub fn find_most(base: &[i32], ceiling: &[i32], depth: &[i32], into: &mut [f32]) -> f32 {
-    let mut least = [1.0; STRIP];
+pub fn find_k_max(base: &[i32], ceiling: &[i32], depth: &[i32], into: &mut [f32]) -> f32 {
+    let mut minimum = [1.0; STRIP];
     for strip in 0..into.len() / STRIP {
         let columns = [base, ceiling, depth].map(|numbers| strip_of(numbers, strip));
-        most_of(columns, strip_mut(into, strip), &mut least);
+        k_max_of(columns, strip_mut(into, strip), &mut minimum);
     }
-    least.into_iter().fold(1.0, min)
+    minimum.into_iter().fold(1.0, min)
 }
 
 #[inline(always)]
-fn most_of([base, ceiling, depth]: [&[i32; STRIP]; 3], into: &mut [f32; STRIP], least: &mut [f32; STRIP]) {
+fn k_max_of([base, ceiling, depth]: [&[i32; STRIP]; 3], into: &mut [f32; STRIP], minimum: &mut [f32; STRIP]) {
     for x in 0..STRIP {
-        into[x] = most(into[x], room(base[x], ceiling[x], depth[x]));
-        least[x] = min(into[x], least[x]);
+        into[x] = k_max(into[x], room(base[x], ceiling[x], depth[x]));
+        minimum[x] = min(into[x], minimum[x]);
     }
 }

@@ -57,7 +57,7 @@ fn is_stirred(around: &Around, strip: usize) -> bool {
 }
 
 /// Finds the amounts that transfers between columns and their neighbours move, given the concentrations (levels) of both.
-pub fn take_along(own: &[f64], other: &[f64], transfer: &[f32], moved: &mut [f64]) {
+pub fn find_moved_amounts(own: &[f64], other: &[f64], transfer: &[f32], moved: &mut [f64]) {
     dispatch!(body(own: &[f64], other: &[f64], transfer: &[f32], moved: &mut [f64]));
 
     #[inline(always)]

@@ -4,7 +4,7 @@
 
 use std::ops::Range;
 
-use super::cliffs::beside;
+use super::cliffs::index_beyond;
 use super::pipe_rules::Rules;
 use super::side::Side;
 use super::slopes::{self, Rises};
@@ -31,15 +31,15 @@ impl Finder {
         [east, south]: [&mut [f32]; 2],
         links: &mut Links,
     ) {
-        let (count, Rules { cliffs, steepest, .. }) = (columns.grid.size[1], rules);
+        let (count, Rules { cliffs, wall_rise, .. }) = (columns.grid.size[1], rules);
         for row in rows.start.saturating_sub(1)..(rows.start + 1).min(count) {
             self.stacks[row % 3].find_row(columns, row);
         }
-        self.rises[rows.start % 2].find(columns, rows.start, *steepest);
+        self.rises[rows.start % 2].find(columns, rows.start, *wall_rise);
         for row in rows {
             if row + 1 < count {
                 self.stacks[(row + 1) % 3].find_row(columns, row + 1);
-                self.rises[(row + 1) % 2].find(columns, row + 1, *steepest);
+                self.rises[(row + 1) % 2].find(columns, row + 1, *wall_rise);
             }
             let rises = [&self.rises[row % 2], &self.rises[(row + 1) % 2]];
             slopes::open_row(columns, row, rises, east, south);
@@ -200,7 +200,7 @@ impl<'a> Joiner<'a> {
     /// Whether the cell beyond a side is void at a height: it has no ground, or only ground that hangs above.
     fn is_void(&self, side: Side, cell: [usize; 2], height: i32) -> bool {
         self.beyond(side).is_some_and(|stacks| !stacks.is_grounded && height < stacks.sills[cell[0]])
-            && !self.rules.apart.as_ref().is_some_and(|apart| apart.has(cell))
+            && !self.rules.excluded.as_ref().is_some_and(|excluded| excluded.has(cell))
     }
 
     /// Adds the links of a column over a side: those to columns of other layers or over cliffs, which the cell to the west or north owns,
@@ -215,7 +215,7 @@ impl<'a> Joiner<'a> {
                 if columns.overlap(i, j) && (other != layer || self.rules.cliffs.has(columns, i, j)) {
                     let along = 4 * (i64::from(columns.bases()[j]) - i64::from(columns.bases()[i]));
                     let across = self.across(i, side) + self.across(j, side);
-                    links.add(i, j as u32, side, self.open(along, across), 0);
+                    links.add(i, j as u32, side, self.openness(along, across), 0);
                 }
             }
         }
@@ -226,15 +226,15 @@ impl<'a> Joiner<'a> {
                 (columns.grid.cell / columns.heights.unit).min(f64::from(i32::MAX / 2)) as i64
             } else {
                 // The slope of the ground continues outside, but never rises.
-                let inner = beside(columns, i, side.opposite()).filter(|&j| columns.overlap(i, j));
+                let inner = index_beyond(columns, i, side.opposite()).filter(|&j| columns.overlap(i, j));
                 inner.map_or(0, |j| (i64::from(columns.bases()[j]) - base).max(0))
             };
-            let open = self.open(4 * fall, 2 * self.across(i, side));
+            let open = self.openness(4 * fall, 2 * self.across(i, side));
             links.add(i, NONE, side, open, (base - fall).max(i64::from(i32::MIN / 2)) as i32);
         }
     }
 
-    fn open(&self, along: i64, across: i64) -> f32 {
+    fn openness(&self, along: i64, across: i64) -> f32 {
         slopes::openness(along as f64, across as f64, self.scale)
     }
 

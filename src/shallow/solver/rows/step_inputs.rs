@@ -1,19 +1,19 @@
 //! The inputs of a step, and its results.
 
-use super::band_views::Parts;
+use super::band_views::BandView;
 use crate::shallow::columns::Columns;
 use crate::shallow::pipes::Pipes;
 use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::scalars::amounts::{Changes, LawEffect};
 use crate::shallow::solver::active::Active;
 use crate::shallow::solver::fast_films::Fast;
-use crate::shallow::solver::lateral_friction::Walls;
+use crate::shallow::solver::lateral_friction::LateralFriction;
 use crate::shallow::solver::link_step::{Outside, RowLinks, indices_of};
 use crate::shallow::solver::overflow_edges::OverflowEdges;
 use crate::shallow::solver::pressurised::network::Network;
 
 /// The inputs of a step.
-pub struct Ground<'a> {
+pub struct StepInputs<'a> {
     /// Columns.
     pub columns: &'a Columns,
     /// Pipes between them.
@@ -25,7 +25,7 @@ pub struct Ground<'a> {
     /// Films with reduced inertia.
     pub fast: &'a Fast,
     /// Lateral friction of pipes.
-    pub walls: &'a Walls,
+    pub friction: &'a LateralFriction,
     /// Overflow edges: links that liquid falls freely from.
     pub overflow_edges: &'a OverflowEdges,
     /// Whether slow liquid may come to rest.
@@ -38,7 +38,7 @@ pub struct Ground<'a> {
     pub law_effects: &'a [LawEffect],
 }
 
-impl<'a> Ground<'a> {
+impl<'a> StepInputs<'a> {
     /// The links that a row owns.
     pub fn links_of(&self, row: usize) -> RowLinks<'a> {
         RowLinks { links: &self.pipes.links, overflow_edges: self.overflow_edges, row }
@@ -57,7 +57,7 @@ impl<'a> Ground<'a> {
 
 /// Results of a band in a step.
 #[derive(Debug, Clone, Default)]
-pub struct Stepped {
+pub struct StepResults {
     /// Counts of rows with columns that would have given more than they had, with columns that would have received more than they had room
     /// for, and with fast films that were limited.
     pub scaled: [u32; 3],
@@ -66,16 +66,22 @@ pub struct Stepped {
     /// Strips that became wet.
     pub woken: Vec<u32>,
     /// Changes of scalars.
-    pub carried: [Changes; MAX_SCALARS],
+    pub scalar_changes: [Changes; MAX_SCALARS],
 }
 
-/// Calls `add` with each column of a row that gives or receives through a link, and how much.
-pub fn each_link(ground: &Ground, parts: &Parts, row: usize, gives: bool, mut add: impl FnMut(u32, i64)) {
-    if ground.pipes.links.columns_of(row).is_empty() {
+/// Calls `add` with each column of a row that gives (or receives) through a link, and how much (units).
+pub fn for_each_link_end(
+    inputs: &StepInputs,
+    view: &BandView,
+    row: usize,
+    gives: bool,
+    mut add: impl FnMut(u32, i64),
+) {
+    if inputs.pipes.links.columns_of(row).is_empty() {
         return;
     }
-    let within = indices_of(ground.columns, row);
-    for owner in row.saturating_sub(1).max(parts.first)..row + 1 {
-        parts.see(owner).links.each(ground.links_of(owner), &within, gives, &mut add);
+    let within = indices_of(inputs.columns, row);
+    for owner in row.saturating_sub(1).max(view.first)..row + 1 {
+        view.part(owner).links.for_each_end(inputs.links_of(owner), &within, gives, &mut add);
     }
 }

@@ -37,13 +37,13 @@ pub struct Room {
 }
 
 /// Whether columns of a depth (units) have lateral friction.
-pub fn counts(step: &Step, depth: i32) -> bool {
+pub fn has_friction(step: &Step, depth: i32) -> bool {
     depth as f32 > THIN * step.cell
 }
 
 /// Weight of a wall beside liquid of a depth (units).
 #[inline(always)]
-fn counted(step: &Step, height: f32) -> f32 {
+fn wall_weight(step: &Step, height: f32) -> f32 {
     let part = (height - THIN * step.cell) * (1.0 / ((THICK - THIN) * step.cell));
     min(max(part, 0.0), 1.0)
 }
@@ -51,7 +51,7 @@ fn counted(step: &Step, height: f32) -> f32 {
 /// The share of the mean of phi^2 in the lowest part x of the depth; phi = 3/2 (2 x - x^2) below a free surface, and 6 (x - x^2) below a
 /// ceiling.
 #[inline(always)]
-fn share<const FULL: bool>(x: f32) -> f32 {
+fn profile_share<const FULL: bool>(x: f32) -> f32 {
     let cube = x * x * x;
     if FULL { cube * (10.0 - x * (15.0 - 6.0 * x)) } else { cube * (2.5 - x * (1.875 - 0.375 * x)) }
 }
@@ -67,13 +67,13 @@ pub fn walls<const FULL: bool>(step: &Step, high: f32, inverse: f32, parts: [f32
     let s = if FULL { REACH_FULL } else { REACH } * step.cell * inverse;
     let one = s + 1.0 + 1.0 / (1.0 + s * (1.0 / 3.0 + 0.057 * s));
     let more = 2.0 + 6.0 / (1.0 + s * (0.25 + 0.03 * s));
-    ((parts[0] + parts[1]) * one + parts[0] * parts[1] * more) * high * counted(step, high)
+    ((parts[0] + parts[1]) * one + parts[0] * parts[1] * more) * high * wall_weight(step, high)
 }
 
 /// Effective height (units) of a contact: its friction relative to that of a linear profile between pipes, likewise: (s / 2)^2 / sinh^2(s /
 /// 2), with the s of the contact's height.
 #[inline(always)]
-fn fitted<const FULL: bool>(step: &Step, contact: f32) -> f32 {
+fn contact_height<const FULL: bool>(step: &Step, contact: f32) -> f32 {
     let reach = if FULL { REACH_FULL * REACH_FULL } else { REACH * REACH };
     let x = contact * (1.0 / step.cell);
     let square = x * x;
@@ -85,8 +85,8 @@ fn fitted<const FULL: bool>(step: &Step, contact: f32) -> f32 {
     if x > THIN { contact * (cube / sinh) } else { 0.0 }
 }
 
-/// One side of a column: the height (units) in which liquids are in contact ([`fitted`]), and the part that is wall. `inverse` is 1 / H; a
-/// ceiling counts if `ROOFED` and no link leads there.
+/// One side of a column: the height (units) in which liquids are in contact ([`contact_height`]), and the part that is wall. `inverse` is
+/// 1 / H; a ceiling counts if `ROOFED` and no link leads there.
 #[inline(always)]
 pub fn side<const FULL: bool, const ROOFED: bool>(
     step: &Step,
@@ -96,24 +96,24 @@ pub fn side<const FULL: bool, const ROOFED: bool>(
     is_linked: bool,
 ) -> [f32; 2] {
     let rise = (beyond.base - own.base) as f32;
-    let over = (beyond.base + beyond.depth - (own.base + own.depth)) as f32;
+    let surface_rise = (beyond.base + beyond.depth - (own.base + own.depth)) as f32;
     let (high, other) = (own.depth as f32, beyond.depth as f32);
     // It is a slope as far as the surfaces differ in height like the bases.
-    let most = min(max(rise, -step.cell), step.cell);
-    let lean = min(max(over, min(most, 0.0)), max(most, 0.0));
+    let bound = min(max(rise, -step.cell), step.cell);
+    let lean = min(max(surface_rise, min(bound, 0.0)), max(bound, 0.0));
     let foot = rise - lean;
     let up = max(foot, 0.0);
     let contact = max(min(high, foot + other) - up, 0.0);
-    let below = share::<FULL>(min(up * inverse, 1.0));
+    let below = profile_share::<FULL>(min(up * inverse, 1.0));
     let wall = if ROOFED {
         let top = min(max((beyond.ceiling - own.base) as f32 * inverse, 0.0), 1.0);
         let top = if is_linked { 1.0 } else { top };
         // Without a ceiling this equals the other branch, to the last bit.
-        min(below + (1.0 - share::<FULL>(top)), 1.0)
+        min(below + (1.0 - profile_share::<FULL>(top)), 1.0)
     } else {
         below
     };
-    [fitted::<FULL>(step, contact), wall]
+    [contact_height::<FULL>(step, contact), wall]
 }
 
 /// Stands in for absent columns.
@@ -141,7 +141,7 @@ fn find_strips(step: &Step, around: &Around, strips: &[u32], first: usize, out: 
             (north == NONE || roofed[north as usize]) || (south == NONE || roofed[south as usize]);
         let numbers =
             (strip_mut(all_z, position), strip_mut(before_z, position), strip_mut(behind_z, position));
-        both(
+        find_strip(
             step,
             own,
             [around.beyond(north), around.beyond(south)],
@@ -164,7 +164,7 @@ fn find_strips(step: &Step, around: &Around, strips: &[u32], first: usize, out: 
             || roofed[strip + usize::from(has_east)];
         let numbers =
             (strip_mut(all_x, position), strip_mut(before_x, position), strip_mut(behind_x, position));
-        both(step, own, [west.each_ref(), east.each_ref()], [links[2], links[0]], is_roofed, numbers);
+        find_strip(step, own, [west.each_ref(), east.each_ref()], [links[2], links[0]], is_roofed, numbers);
     }
 }
 
@@ -201,25 +201,25 @@ impl<'a> Around<'a> {
 }
 
 /// Outputs for a strip: the sum of contact and walls, contact before, and contact behind.
-type Found<'a> = (&'a mut [f32; STRIP], &'a mut [f32; STRIP], &'a mut [f32; STRIP]);
+type Output<'a> = (&'a mut [f32; STRIP], &'a mut [f32; STRIP], &'a mut [f32; STRIP]);
 
-/// Both sides of a strip across one axis.
+/// Finds the surroundings of a strip across one axis.
 #[inline(always)]
-fn both(step: &Step, own: Strip, sides: [Strip; 2], links: [u16; 2], is_roofed: bool, found: Found) {
+fn find_strip(step: &Step, own: Strip, sides: [Strip; 2], links: [u16; 2], is_roofed: bool, out: Output) {
     if is_roofed {
-        both_strips::<true>(step, own, sides, links, found);
+        find_strip_of::<true>(step, own, sides, links, out);
     } else {
-        both_strips::<false>(step, own, sides, links, found);
+        find_strip_of::<false>(step, own, sides, links, out);
     }
 }
 
 #[inline(always)]
-fn both_strips<const ROOFED: bool>(
+fn find_strip_of<const ROOFED: bool>(
     step: &Step,
     own: Strip,
     [first, second]: [Strip; 2],
     links: [u16; 2],
-    (all, before, behind): Found,
+    (all, before, behind): Output,
 ) {
     for x in 0..STRIP {
         let high = own[2][x] as f32;
@@ -245,7 +245,7 @@ mod tests {
 
     /// Cells of 1,000 units.
     fn step() -> Step {
-        Step { cell: 1000.0, ..Step::still() }
+        Step { cell: 1000.0, ..Step::without_forces() }
     }
 
     fn room(base: i32, depth: i32) -> Room {
@@ -258,12 +258,12 @@ mod tests {
 
     #[test]
     fn the_profiles_have_a_share_of_1_over_the_whole_depth_and_a_ceilings_is_even() {
-        assert_eq!((share::<false>(1.0), share::<true>(1.0)), (1.0, 1.0));
-        assert_eq!(share::<true>(0.5), 0.5);
+        assert_eq!((profile_share::<false>(1.0), profile_share::<true>(1.0)), (1.0, 1.0));
+        assert_eq!(profile_share::<true>(0.5), 0.5);
         for (x, free) in [(0.2f32, 2.5 * 0.008 - 1.875 * 0.0016 + 0.375 * 0.00032), (0.5, 0.20703125)] {
-            assert!((share::<false>(x) - free).abs() < 1e-6, "{x}");
+            assert!((profile_share::<false>(x) - free).abs() < 1e-6, "{x}");
         }
-        let small = share::<false>(0.01);
+        let small = profile_share::<false>(0.01);
         assert!((small / 2.5e-6 - 1.0).abs() < 0.01, "by the cube above the ground: {small}");
     }
 
@@ -276,13 +276,13 @@ mod tests {
                 let sinh = (exp(0.5 * s) - exp(-0.5 * s)) / 2.0;
                 let [contact, one, both] = if is_full {
                     [
-                        fitted::<true>(&step(), depth),
+                        contact_height::<true>(&step(), depth),
                         walls::<true>(&step(), depth, 1.0 / depth, [1.0, 0.0]),
                         walls::<true>(&step(), depth, 1.0 / depth, [1.0; 2]),
                     ]
                 } else {
                     [
-                        fitted::<false>(&step(), depth),
+                        contact_height::<false>(&step(), depth),
                         walls::<false>(&step(), depth, 1.0 / depth, [1.0, 0.0]),
                         walls::<false>(&step(), depth, 1.0 / depth, [1.0; 2]),
                     ]
@@ -305,17 +305,29 @@ mod tests {
         assert_eq!(between(room(0, 2000), room(3000, 0)), [0.0, 1.0], "a dry bank");
         let [contact, wall] = between(room(0, 2000), room(2500, 10));
         assert!(contact == 0.0 && wall > 0.99, "a wet one: {contact}, {wall}");
-        let fitted = |contact: f32| fitted::<false>(&step(), contact);
-        assert_eq!(between(room(0, 2000), room(0, 2000)), [fitted(2000.0), 0.0], "level ground");
-        assert_eq!(between(room(0, 1000), room(900, 1000)), [fitted(1000.0), 0.0], "a film up the slope");
-        assert_eq!(between(room(900, 1000), room(0, 1000)), [fitted(1000.0), 0.0], "a film down the slope");
+        let contact_height = |contact: f32| contact_height::<false>(&step(), contact);
+        assert_eq!(between(room(0, 2000), room(0, 2000)), [contact_height(2000.0), 0.0], "level ground");
+        assert_eq!(
+            between(room(0, 1000), room(900, 1000)),
+            [contact_height(1000.0), 0.0],
+            "a film up the slope"
+        );
+        assert_eq!(
+            between(room(900, 1000), room(0, 1000)),
+            [contact_height(1000.0), 0.0],
+            "a film down the slope"
+        );
         assert_eq!(between(room(0, 1000), room(5000, 1000)), [0.0, 1.0], "a terrace above");
         assert_eq!(between(room(5000, 1000), room(0, 1000)), [0.0, 0.0], "a terrace below");
         assert_eq!(between(room(0, 2000), room(0, 0)), [0.0, 0.0], "a dry edge");
         let [contact, wall] = between(room(0, 2000), room(1000, 1000));
-        assert_eq!((contact, wall), (fitted(1000.0), share::<false>(0.5)), "a step under a level surface");
+        assert_eq!(
+            (contact, wall),
+            (contact_height(1000.0), profile_share::<false>(0.5)),
+            "a step under a level surface"
+        );
         let [back, none] = between(room(1000, 1000), room(0, 2000));
-        assert_eq!((back, none), (fitted(1000.0), 0.0));
+        assert_eq!((back, none), (contact_height(1000.0), 0.0));
     }
 
     #[test]
@@ -325,17 +337,17 @@ mod tests {
         assert_eq!(between(own, nothing), [0.0, 1.0]);
         assert_eq!(side::<false, true>(&step(), own, 5e-4, nothing, true), [0.0, 0.0]);
         let low = Room { base: 700, ceiling: 1700, depth: 1000 };
-        let wall = 1.0 - share::<false>(0.5);
+        let wall = 1.0 - profile_share::<false>(0.5);
         assert_eq!(
             between(own, low),
-            [fitted::<false>(&step(), 1000.0), wall],
+            [contact_height::<false>(&step(), 1000.0), wall],
             "a ceiling below the surface"
         );
     }
 
     #[test]
     fn thin_contact_does_not_count() {
-        assert!(!counts(&step(), 62) && counts(&step(), 63));
+        assert!(!has_friction(&step(), 62) && has_friction(&step(), 63));
         assert_eq!(between(room(0, 62), room(0, 2000))[0], 0.0);
         assert!((0.0..1.0).contains(&between(room(0, 90), room(0, 2000))[0]));
         assert_eq!(walls::<false>(&step(), 62.0, 1.0 / 62.0, [1.0; 2]), 0.0);
