@@ -221,10 +221,10 @@ impl Flow {
         self.multigrid.finest.clear_covered(&mut self.density);
     }
 
-    /// Minus the divergence of each cell, times its edge (m/s).
-    pub fn divergence(&self, solids: &Solids) -> Field {
+    /// Net inflow of each active cell (m/s): minus the divergence times the edge of a cell.
+    pub fn net_inflow(&self, solids: &Solids) -> Field {
         let mut out = vec![[0.0; 512]; self.tiles.active()];
-        pressure::divergence(&self.tiles, solids, &self.velocity, &mut out);
+        pressure::net_inflow(&self.tiles, solids, &self.velocity, &mut out);
         out
     }
 }

@@ -126,7 +126,7 @@ mod tests {
     use super::*;
     use crate::flow::tiles::{Coord, padded};
 
-    /// Speed (m/s) of a column of rotating air around the z axis, as a function of the distance from it.
+    /// Air that rotates around the z axis, with an angular velocity that decreases with the distance from it.
     fn column() -> Flow {
         let mut flow = Flow::new(0.1, [0.0; 3]).unwrap();
         flow.resize(&padded(&[[0, 0, 0]], 2));

@@ -33,9 +33,9 @@ impl Flow {
     }
 
     /// The same with [`Scheme::Bounded`], with mass conservation: a density that is not negative keeps the requested share of its mass, to
-    /// rounding, and what the scheme loses or gains is restored within two tiles, or farther away if the density there would have to grow
-    /// by more than a fifth at once. Mass is lost only if all of the density together would have to grow by more than that: this happens
-    /// to the last mist, thinner than `fade_below`.
+    /// rounding. The mass that the scheme loses or gains is restored within two tiles, or farther away if the density there would have to
+    /// grow by more than a fifth at once. Mass is lost only if all of the density together would have to grow by more than that: this
+    /// happens to the last mist, thinner than `fade_below`.
     ///
     /// # Errors
     /// Cancel; the fields are then invalid.

@@ -53,7 +53,7 @@ pub fn project(
     let fastest = max(fastest(velocity), solids.fastest());
     let target = tolerance * fastest;
     let pockets = Pockets::find(&multigrid.finest);
-    divergence(tiles, solids, velocity, guess);
+    net_inflow(tiles, solids, velocity, guess);
     // Cells inside solids have no equation: divergence that solids cause there must not reach the coarse levels.
     multigrid.finest.clear_covered(guess);
     pockets.subtract_means(guess);
@@ -160,7 +160,7 @@ pub fn fastest_except(velocity: &[Field; 3], share: f64) -> f32 {
 }
 
 /// Net inflow of each cell (m/s: minus the divergence times the cell).
-pub fn divergence(tiles: &Tiles, solids: &Solids, velocity: &[Field; 3], out: &mut [Tile]) {
+pub fn net_inflow(tiles: &Tiles, solids: &Solids, velocity: &[Field; 3], out: &mut [Tile]) {
     out.par_iter_mut().enumerate().with_min_len(16).for_each(|(slot, out)| {
         for (row, out) in out.chunks_exact_mut(8).enumerate() {
             let sides = [0, 1, 2].map(|axis| fluxes(tiles, solids, velocity, axis, [slot, row]));

@@ -99,7 +99,7 @@ pub fn layer(
     Ok(layer)
 }
 
-/// Checks that cells can represent a layer: below a cell a level set has no true volume.
+/// Checks that cells can represent a layer: the volume of a level set thinner than a cell is wrong.
 ///
 /// # Errors
 /// A depth or a plane of less than a cell; the message names it.

@@ -86,7 +86,7 @@ impl BaseLayer {
         let (before, volume) = (Vec::new(), layer.changes.volume);
         let changes = Changes { surface, touched, compression, before, removed, volume };
         layer.commit(ctx, changes, columns)?;
-        // Nothing has changed since this state.
+        // The restored state counts as unchanged.
         layer.take_changes()?;
         Ok(layer)
     }

@@ -33,8 +33,8 @@ pub use surroundings::{Surroundings, Walls};
 const JET_SHARE: f64 = 1.0e-4;
 /// Density below which there is no mist.
 pub const MIN_DENSITY: f32 = 2.0e-3;
-/// Density from which a tile is padded with air, so that its mist may spread there. Thinner mist is invisible and only moves on in existing
-/// tiles: otherwise a few fast grains would open hundreds of tiles for a litre of mist.
+/// Density from which a tile is padded with air, so that its mist may spread there. Thinner mist is invisible and only moves within
+/// existing tiles: otherwise a few fast grains would open hundreds of tiles for a litre of mist.
 const DENSE: f32 = 0.02;
 /// Maximum length (s) of a sub-step. The length affects how far mist spreads, and how often grains fill the cells that they cross: it is
 /// chosen so that frames of 1/24, 1/48 and 1/96 s have the same sub-steps.

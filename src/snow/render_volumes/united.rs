@@ -85,7 +85,7 @@ struct Fine {
 }
 
 impl Fine {
-    /// The blocks of a cube that are near the surface: `probes` are the base's leaf there and the seven after it.
+    /// The blocks of a cube that are near the surface: `probes` are the base's leaf there and its [`adjacent_leaves`].
     fn blocks(&self, cube: [i32; 3], probes: &[Probe<'_>], squares: Vec<SquaredDistances>) -> Vec<BlockEdit> {
         let cells = Cells::of(probes);
         let mut squares = squares.into_iter().peekable();

@@ -27,7 +27,7 @@ fn a_random_velocity_becomes_free_of_divergence() {
     let solids = Solids::none(flow.tiles());
     let solved = ctx.phase("project", || flow.project(&ctx, &open, 1.0e-5)).unwrap();
     assert!(solved.iterations <= 16, "{solved:?}");
-    let left = greatest(&flow.divergence(&solids));
+    let left = greatest(&flow.net_inflow(&solids));
     assert!(left <= 1.2e-5 * solved.fastest, "{left} {solved:?}");
 }
 
@@ -40,7 +40,7 @@ fn a_ball_that_moves_carries_the_air_around_it() {
     let solved = ctx.phase("project", || flow.project(&ctx, &boundary, 1.0e-5)).unwrap();
     let solids = boundary(flow.tiles(), flow.cell()).unwrap();
     assert!(solved.iterations <= 25, "{solved:?}");
-    let left = flow.divergence(&solids);
+    let left = flow.net_inflow(&solids);
     for (coord, tile) in flow.tiles().coords().iter().zip(&left) {
         for (cell, value) in tile.iter().enumerate() {
             assert!(value.abs() < 1.0e-4, "{coord:?} {:?}: {value}", [cell >> 6, cell >> 3 & 7, cell & 7]);
@@ -69,7 +69,7 @@ fn solids_that_move_into_each_other_leave_the_air_around_them_solvable() {
     let solved = ctx.phase("project", || flow.project(&ctx, &boundary, 1.0e-5)).unwrap();
     assert!(solved.iterations <= 40 && solved.divergence <= 1.0e-5 * solved.fastest, "{solved:?}");
     let solids = boundary(flow.tiles(), flow.cell()).unwrap();
-    let left = flow.divergence(&solids);
+    let left = flow.net_inflow(&solids);
     let mut covered = 0;
     for (slot, tile) in left.iter().enumerate() {
         for (cell, value) in tile.iter().enumerate() {
@@ -146,7 +146,7 @@ fn a_sealed_pocket_that_shrinks_is_solved() {
     assert!(solved.iterations < 40 && solved.divergence <= 1.0e-5 * solved.fastest, "{solved:?}");
     let middle = flow.tiles().find([0, 0, 0]).unwrap() as usize;
     // What the wall presses in remains, evenly.
-    let left = flow.divergence(&solids);
+    let left = flow.net_inflow(&solids);
     let mean = 64.0 / 512.0;
     let off = left[middle].iter().fold(0.0f32, |most, value| most.max((value - mean).abs()));
     assert!(off < 1.0e-4, "{off}");

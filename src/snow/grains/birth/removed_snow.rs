@@ -1,4 +1,4 @@
-//! Removed snow: how much of it is gone from each voxel.
+//! The snow that a step removed from the base layer, block by block.
 
 use std::collections::BTreeSet;
 

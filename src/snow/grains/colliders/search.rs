@@ -128,7 +128,7 @@ impl Search<'_> {
         let mut bounds = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
         let mut farthest = 0.0f64;
         for &slot in &block.members {
-            // SAFETY: a grain is a member of one block, which one task has.
+            // SAFETY: a grain is a member of one block, which only one task visits.
             let row = unsafe { rows.get(slot as usize) };
             let reach = REACH + f64::from(norm(row.velocity)) * self.dt / self.diameter;
             let closing = if row.rests() {

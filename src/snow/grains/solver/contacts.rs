@@ -220,7 +220,7 @@ static NEAR_CELLS: LazyLock<Vec<Vec<Cells>>> = LazyLock::new(|| {
 const EARLIER: [usize; 13] = [0, 1, 2, 9, 10, 11, 18, 19, 20, 3, 4, 5, 12];
 
 impl Block {
-    /// Whether a pair that the block owned is still its own: neither grain has changed blocks.
+    /// Whether the block still owns a pair: neither grain has changed blocks.
     #[inline(always)]
     fn still_owns(&self, homes: [Home; 2], code: usize, index: usize) -> bool {
         homes[0].block == index as u32 && homes[1].block == self.near[code]

@@ -48,9 +48,9 @@ pub struct Layout {
     pub columns: Vec<Column>,
     /// Home of each grain, by slot.
     pub homes: Vec<Home>,
-    /// Whether a grain has just changed blocks.
+    /// Whether a grain changed blocks in the last update.
     pub has_moved: bool,
-    /// Whether one has since the start of the step.
+    /// Whether a grain has changed blocks since the start of the step.
     pub has_ever_moved: bool,
     /// Impulses of the last step with the block that owns the pair, sorted by block.
     pub kept: Vec<(u32, PairImpulse)>,
@@ -176,7 +176,7 @@ impl Layout {
                 let (mut gone, at, near) = (Vec::new(), block.at, block.near);
                 block.members.retain(|&slot| {
                     let mut now = at;
-                    // SAFETY: a grain is a member of one block, which one task has.
+                    // SAFETY: a grain is a member of one block, which only one task visits.
                     settle(unsafe { shared.get(slot as usize) }, &mut now);
                     if now != at {
                         gone.push(Mover { slot, at: now, block: adjacent_block(at, &near, now) });
@@ -272,7 +272,7 @@ impl Layout {
                 }
             }
             for (member, &slot) in (0..).zip(&*members) {
-                // SAFETY: a grain is a member of one block, which one task has.
+                // SAFETY: a grain is a member of one block, which only one task visits.
                 unsafe { homes.get(slot as usize).rank = member };
             }
             block.starts = starts;

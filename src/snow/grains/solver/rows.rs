@@ -113,7 +113,7 @@ impl Shared<'_, Row> {
     /// The row exists.
     #[inline(always)]
     unsafe fn part(&self, row: u32, part: Part) -> *mut f32 {
-        // SAFETY: a row has sixteen numbers, of which the part's are four.
+        // SAFETY: a row has sixteen numbers, and a part is four of them.
         unsafe { self.first.cast::<f32>().add(row as usize * 16 + part as usize) }
     }
 

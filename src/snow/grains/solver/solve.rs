@@ -77,7 +77,7 @@ fn sweep(rows: &mut [Row], layout: &mut Layout, colour: &[u32], pass: Pass, c: &
     let batches = Shared::new(&mut layout.batches);
     colour.par_iter().with_max_len(1).for_each(|&column| {
         for &block in &columns[column as usize].blocks {
-            // SAFETY: a block is in one column, which one task has.
+            // SAFETY: a block is in one column, which only one task visits.
             let (block, batches) = unsafe { (blocks.get(block as usize), batches.get(block as usize)) };
             if !block.is_reached {
                 continue;
@@ -112,7 +112,7 @@ fn accelerate(rows: &mut [Row], layout: &mut Layout, c: &Coefficients) {
         |slot: u32| c.air_by_neighbours.map_or(c.air, |air| air[usize::from(neighbours[slot as usize])]);
     blocks.par_iter_mut().filter(|block| block.is_awake).for_each(|block| {
         for &slot in &block.members {
-            // SAFETY: a grain is a member of one block, which one task has.
+            // SAFETY: a grain is a member of one block, which only one task visits.
             let row = unsafe { rows.get(slot as usize) };
             if !row.rests() {
                 let velocity = add(row.velocity, scaled(c.gravity, c.dt));
@@ -148,7 +148,7 @@ fn begin_touch(row: &mut Row, touch: &mut Touch, c: &Coefficients) {
 /// lower for the same reason, plus the slope of the surface. So it stops wherever a grain can lie, and slides by Coulomb's law where none
 /// can. With full friction, columns that collapse run out a third less far than in experiments, where the ground does not matter (Lube et
 /// al. 2004): their lowest layer never moves. Two kinds keep full friction: grains that attract each other, which stick together and do not
-/// roll, and those on a moving collider, which carries them along with the friction that it was given.
+/// roll, and those on a moving collider, which carries them along with its own friction.
 fn friction(row: &Row, touch: &Touch, c: &Coefficients) -> f32 {
     if c.attraction > 0.0 || touch.velocity != [0.0; 3] {
         return touch.friction;
@@ -170,7 +170,7 @@ fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients, motion: Moti
     let fastest = reached.map(|block| {
         correct_touches(rows, &mut block.touches, true, c);
         for touch in block.touches.iter().filter(|touch| touch.is_ground) {
-            // SAFETY: a touch's grain is a member of its block, which one task has.
+            // SAFETY: a touch's grain is a member of its block, which only one task visits.
             keep_outside_ground(unsafe { rows.get(touch.grain as usize) }, touch, c);
         }
         let far = (0.5 * block.skin).powi(2);
@@ -178,7 +178,7 @@ fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients, motion: Moti
         let Block { members, anchors, .. } = block;
         (block.is_awake, block.has_strayed) = (false, false);
         for (member, &slot) in members.iter().enumerate() {
-            // SAFETY: a grain is a member of one block, which one task has.
+            // SAFETY: a grain is a member of one block, which only one task visits.
             let row = unsafe { rows.get(slot as usize) };
             if !row.rests() {
                 advance_grain(row, c, &motion);
@@ -223,7 +223,7 @@ fn advance_grain(row: &mut Row, c: &Coefficients, motion: &Motion) {
 /// Corrects the touches of a block.
 fn correct_touches(rows: Shared<'_, Row>, touches: &mut [Touch], last: bool, c: &Coefficients) {
     for touch in touches {
-        // SAFETY: a touch's grain is a member of its block, which one task has.
+        // SAFETY: a touch's grain is a member of its block, which only one task visits.
         correct_touch(unsafe { rows.get(touch.grain as usize) }, touch, c, last);
     }
 }
