@@ -38,12 +38,12 @@ pub(in crate::scene::shallow) fn allow_cells(ctx: &Context, grid: &Grid) -> Resu
 }
 
 /// Estimated bytes of a run.
-pub(in crate::scene::shallow) fn memory(of: &Shallow, grid: &Grid, columns: u64, triangles: u64) -> u64 {
-    let walls = if of.params.friction == Friction::Walls { WALLS } else { 0 };
-    let thick = if of.params.thickening.is_some() { THICK } else { 0 };
-    let triangle = TRIANGLE + if of.staining.is_some() { STAINED } else { 0 };
-    let column = COLUMN + SCALAR * of.scalars.len() as u64 + walls + thick;
-    let drops = DROP * of.params.falls.map_or(0, |falls| falls.max_packets as u64);
+pub(in crate::scene::shallow) fn memory(setup: &Shallow, grid: &Grid, columns: u64, triangles: u64) -> u64 {
+    let walls = if setup.params.friction == Friction::Walls { WALLS } else { 0 };
+    let thick = if setup.params.thickening.is_some() { THICK } else { 0 };
+    let triangle = TRIANGLE + if setup.staining.is_some() { STAINED } else { 0 };
+    let column = COLUMN + SCALAR * setup.scalars.len() as u64 + walls + thick;
+    let drops = DROP * setup.params.falls.map_or(0, |falls| falls.max_packets as u64);
     FIXED + CELL * grid.cells() as u64 + column * columns + triangle * triangles + drops
 }
 
@@ -82,7 +82,7 @@ pub(in crate::scene::shallow) fn frame_bytes(setup: &Shallow, columns: u64, tria
     let usd = TEXT * numbers + 2 * 3 * INDEX + 2 * 3;
     let state = STATE + STATE_OF_SCALAR * scalars;
     let each = if_asked(output.ply, ply) + if_asked(output.usd, usd) + if_asked(output.vdb, VOXEL) + state;
-    let drops = of.params.falls.map_or(0, |falls| falls.max_packets);
+    let drops = setup.params.falls.map_or(0, |falls| falls.max_packets);
     // For each vertex of its mesh two triangles.
     let in_air = bound(drops).vertices as u64 * (if_asked(output.ply, ply) + if_asked(output.usd, usd));
     let stained = if_asked(setup.staining.is_some(), FILE_OF_STAINED * triangles);

@@ -21,7 +21,7 @@ use crate::io::files::source;
 use crate::io::records::input_hashes::InputHashes;
 use crate::motion::Space;
 use crate::scene::Scene;
-use crate::shallow::columns::grid::{Grid, Heights, MAX_CELLS};
+use crate::shallow::columns::grid::{Grid, Heights, MAX_CELLS, TOP};
 use crate::shallow::terrain::facing::facing;
 use crate::shallow::terrain::{Solids, triangles};
 use attached::{Attached, attach};
