@@ -34,13 +34,13 @@ pub struct Shared<'a> {
     pub ctx: &'a Context,
     /// The shot's first frame.
     pub first: i32,
-    /// Set when a pass has failed: the others stop after their current frame.
+    /// Set when a pass was cancelled or has panicked: the others stop after their current frame.
     pub stop: &'a AtomicBool,
     /// Called for each frame whose files are written.
     pub on_done: OnFrameDone<'a>,
 }
 
-/// A stage whose types of state are erased.
+/// A stage of any type: the associated types of [`Stepping`] are erased.
 pub trait AnyStage: Stage {
     /// See [`Stepping::precheck`].
     #[doc(hidden)]
@@ -88,7 +88,7 @@ pub struct Work<'a> {
     pub upstream: &'a [DoneFrames],
     /// The frames to make, ascending.
     pub todo: &'a [i32],
-    /// Whether the exact states of all frames are kept, as another stage reads them.
+    /// Whether the exact states of all frames are kept, as the stage or another one requires.
     pub every_state: bool,
 }
 
@@ -136,22 +136,23 @@ impl<'a, S: Stepping> StagePass<'a, S> {
     fn step_all(mut self, work: &mut Work<'_>, send: impl Fn(Job<S>) -> bool) -> Result<()> {
         let Work { shared, upstream, todo, .. } = *work;
         let (stage, ctx, cache) = (self.stage, shared.ctx, &mut *work.cache);
-        let mut writer_follows = false;
+        // Whether the writer's state is that from which the next step starts.
+        let mut is_writer_current = false;
         for &wanted in todo {
             let is_nearer = || cache.stored.latest_state(self.frame + 1..=wanted - 1).is_some();
             if self.frame < wanted - 1 && (!stage.has_memory() || is_nearer()) {
                 self = Self::before(stage, ctx, wanted, cache.resumable(shared.first))?;
-                writer_follows = false;
+                is_writer_current = false;
             }
             while self.frame < wanted {
                 if shared.stop.load(Ordering::Relaxed) {
                     return Ok(());
                 }
                 let frame = self.frame + 1;
-                if !writer_follows && !send(Job::Start(stage.writer(ctx, &self.state)?)) {
+                if !is_writer_current && !send(Job::Start(stage.writer(ctx, &self.state)?)) {
                     return Ok(());
                 }
-                writer_follows = true;
+                is_writer_current = true;
                 let hashes = if frame == wanted { Some(cache.hashes(stage, frame, upstream)?) } else { None };
                 let made_from = hashes.as_ref().map(|hashes| &hashes.inputs[..]);
                 let stepped = stage.step(ctx, &mut self.state, &StepTarget { frame, made_from, upstream })?;
@@ -189,7 +190,7 @@ struct FrameWriter<'a, S> {
     stage: &'a S,
     folder: &'a Path,
     first: i32,
-    /// Whether the exact states of all frames are kept, as another stage reads them.
+    /// Whether the exact states of all frames are kept, as the stage or another one requires.
     every_state: bool,
 }
 
