@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::estimate;
 use super::inputs::area;
 use super::stage::liquid_state::LiquidState;
-use super::{Inputs, ML, Shallow};
+use super::{Inputs, ML, SceneScalar, Shallow};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::scene::{Scene, Value};
@@ -160,14 +160,31 @@ fn added_volume(scene: &Scene, setup: &Shallow) -> f64 {
     let frames = scene.shot.frames;
     let later = |frame: i32| frame > frames.first && frame <= frames.last;
     let poured = setup.pours.iter().filter(|pour| pour.frame.is_some_and(later)).map(|pour| pour.volume);
-    let sources = setup.points.iter().filter(|point| point.point.kind == Kind::Source);
+    let sources = setup.points.iter().filter(|point| point.flow_point.kind == Kind::Source);
     let sourced = sources.map(|point| {
         let from = point.from.unwrap_or(frames.first).max(frames.first + 1);
         let to = point.until.unwrap_or(frames.last).min(frames.last);
-        point.point.rate * f64::from((to - from + 1).max(0)) / scene.shot.fps
+        point.flow_point.rate * f64::from((to - from + 1).max(0)) / scene.shot.fps
     });
     // An empty sum is -0.
     poured.sum::<f64>() + sourced.sum::<f64>() + 0.0
+}
+
+/// A warning for each scalar that no liquid has.
+fn unused_scalars(setup: &Shallow) -> impl Iterator<Item = String> {
+    let is_unused = move |(index, carried): &(usize, &SceneScalar)| {
+        let sources = setup.points.iter().filter(|point| point.flow_point.kind == Kind::Source);
+        let pours = setup.pours.iter().map(|pour| &pour.carries);
+        let mut added = sources.map(|point| &point.carries).chain(pours);
+        carried.scalar.law != Law::Ages && carried.start == 0.0 && added.all(|carries| carries[*index] == 0.0)
+    };
+    setup.scalars.iter().enumerate().filter(is_unused).map(|(index, carried)| {
+        let name = &carried.scalar.name;
+        format!(
+            "no liquid has any {name}: carries = {{ {name} = 1.0 }} of a [[pour]] or [[source]], or start of scalar.{}, gives it some",
+            index + 1
+        )
+    })
 }
 
 /// Probable mistakes.
@@ -211,19 +228,7 @@ fn probable_mistakes(
             "what stands up to shallow.fill flows off at the border, which is open: \"closed\" or \"absorbing\" keep it".into(),
         );
     }
-    for (index, carried) in setup.scalars.iter().enumerate() {
-        let name = &carried.scalar.name;
-        let has = |carries: &Vec<f64>| carries[index] != 0.0;
-        let sources = setup.points.iter().filter(|point| point.point.kind == Kind::Source);
-        let is_brought =
-            sources.map(|point| &point.carries).chain(setup.pours.iter().map(|pour| &pour.carries)).any(has);
-        if carried.scalar.law != Law::Ages && carried.start == 0.0 && !is_brought {
-            out.push(format!(
-                "no liquid has any {name}: carries = {{ {name} = 1.0 }} of a [[pour]] or [[source]], or start of scalar.{}, gives it some",
-                index + 1
-            ));
-        }
-    }
+    out.extend(unused_scalars(setup));
     if setup.points.is_empty() && setup.pours.is_empty() && setup.fill.is_none() {
         out.push("there is no liquid: no [[pour]], no [[source]], no shallow.fill".into());
     }

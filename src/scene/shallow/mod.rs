@@ -108,7 +108,7 @@ pub struct TimedFlowPoint {
     /// Its table, `source`, and its index there, from 0.
     pub name: (&'static str, usize),
     /// The flow point; if it follows the terrain, its position before it is attached.
-    pub point: FlowPoint,
+    pub flow_point: FlowPoint,
     /// Concentrations of the scalars in the liquid of a source.
     pub carries: Vec<f64>,
     /// Whether it moves with the terrain.
@@ -255,7 +255,7 @@ impl TimedFlowPoint {
         };
         // Absorbers do not pulse.
         let pulse = own.find("frequency").zip(own.find("swing"));
-        let point = FlowPoint {
+        let flow_point = FlowPoint {
             kind,
             at: own.get("at"),
             radius: own.get("radius"),
@@ -266,7 +266,7 @@ impl TimedFlowPoint {
         };
         Self {
             name: (table, index),
-            point,
+            flow_point,
             carries: inputs::scalars::concentrations(values, table, index),
             follows: own.get("follows"),
             from: own.find("from"),

@@ -41,7 +41,7 @@ pub(in crate::scene::shallow) fn attach(
     }
     let tree = ctx.pool().install(|| NearestTree::new(mesh));
     let attach = |at: [f64; 3]| tree.nearest(at.into()).map(|nearest| Attached::of(&nearest, mesh));
-    setup.points.iter().map(|point| attach(point.point.at).filter(|_| point.follows)).collect()
+    setup.points.iter().map(|point| attach(point.flow_point.at).filter(|_| point.follows)).collect()
 }
 
 fn corners(mesh: &TriMesh, triangle: usize) -> [DVec3; 3] {

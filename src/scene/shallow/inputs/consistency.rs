@@ -16,24 +16,8 @@ impl Shallow {
     /// Keys that exclude each other, or one that others need.
     pub(in crate::scene) fn check(table: &Table, values: &Values) -> Result<()> {
         let Some(shallow) = Self::of(values) else { return Ok(()) };
-        let has = |name: &str| values.table("shallow").value(name).is_some();
-        let kind = extension(&shallow.terrain);
-        let is_mesh = EXTENSIONS.contains(&&*kind);
-        for name in ["terrain_size", "terrain_height"] {
-            match (kind == "png", has(name)) {
-                (true, false) => {
-                    return Err(table.error(name, "is missing: an image needs its size and its heights (m)"));
-                }
-                (false, true) => return Err(table.error(name, "is of a .png image: leave it out")),
-                _ => {}
-            }
-        }
-        if shallow.image.is_some_and(|image| image.size.iter().any(|length| *length <= 0.0)) {
-            return Err(table.error("terrain_size", "must be two lengths over 0 m"));
-        }
-        if shallow.image.is_some_and(|image| image.heights[0] >= image.heights[1]) {
-            return Err(table.error("terrain_height", "must be [low, high] with low < high"));
-        }
+        check_image(&shallow, table, values)?;
+        let is_mesh = EXTENSIONS.contains(&&*extension(&shallow.terrain));
         if !is_mesh && shallow.space != crate::motion::Space::OWN {
             let name = ["scale", "up"].into_iter().find(|name| table.has(name)).unwrap_or("origin");
             return Err(table.error(name, "is for meshes: leave it out"));
@@ -107,6 +91,28 @@ impl Shallow {
             }
         }
     }
+}
+
+/// Checks the placement of an image of heights.
+fn check_image(shallow: &Shallow, table: &Table, values: &Values) -> Result<()> {
+    let is_image = extension(&shallow.terrain) == "png";
+    for name in ["terrain_size", "terrain_height"] {
+        match (is_image, values.table("shallow").value(name).is_some()) {
+            (true, false) => {
+                return Err(table.error(name, "is missing: an image needs its size and its heights (m)"));
+            }
+            (false, true) => return Err(table.error(name, "is of a .png image: leave it out")),
+            _ => {}
+        }
+    }
+    let Some(image) = shallow.image else { return Ok(()) };
+    if image.size.iter().any(|length| *length <= 0.0) {
+        return Err(table.error("terrain_size", "must be two lengths over 0 m"));
+    }
+    if image.heights[0] >= image.heights[1] {
+        return Err(table.error("terrain_height", "must be [low, high] with low < high"));
+    }
+    Ok(())
 }
 
 fn check_object(index: usize, table: &Table, values: &Values) -> Result<()> {

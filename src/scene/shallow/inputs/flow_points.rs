@@ -10,7 +10,7 @@ use crate::shallow::sources::FlowPoint;
 impl TimedFlowPoint {
     /// Its rate over the step to a frame (m3/s).
     fn rate(&self, frame: i32) -> f64 {
-        if self.is_active(frame) { self.point.rate } else { 0.0 }
+        if self.is_active(frame) { self.flow_point.rate } else { 0.0 }
     }
 }
 
@@ -23,8 +23,8 @@ pub(in crate::scene::shallow) fn at_frame(
 ) -> Vec<FlowPoint> {
     let moved = |(index, point): (usize, &TimedFlowPoint)| {
         let on = inputs.attached.get(index).and_then(Option::as_ref).zip(mesh);
-        let at = on.map_or(point.point.at, |(on, mesh)| on.position(mesh));
-        FlowPoint { at, rate: point.rate(frame), ..point.point.clone() }
+        let at = on.map_or(point.flow_point.at, |(on, mesh)| on.position(mesh));
+        FlowPoint { at, rate: point.rate(frame), ..point.flow_point.clone() }
     };
     setup.points.iter().enumerate().map(moved).collect()
 }

@@ -300,9 +300,9 @@ fn attachment_warnings(
 ) -> Vec<String> {
     let warning = |(point, attached): (&TimedFlowPoint, &Option<Attached>)| {
         let [x, y, z] = attached.as_ref()?.position(mesh);
-        let [own_x, _, own_z] = point.point.at;
+        let [own_x, _, own_z] = point.flow_point.at;
         let off = ((x - own_x).powi(2) + (z - own_z).powi(2)).sqrt();
-        (off > point.point.radius.max(2.0 * setup.cell)).then(|| {
+        (off > point.flow_point.radius.max(2.0 * setup.cell)).then(|| {
             format!(
                 "{}: {}: the point of the terrain that is nearest to it, with which it moves, lies {off:.6} m beside it, at ({x:.6}, {y:.6}, {z:.6})",
                 scene.path.display(),
