@@ -80,10 +80,10 @@ impl Flow {
             return Err(Error::argument("the wind is not finite"));
         }
         let cell = cell as f32;
-        let wide = |level: u32| cell * outer_grid::RATIO.pow(level) as f32;
-        let mut flow = Self { cell: wide(outer_grid::LEVELS), ambient, ..Self::default() };
+        let cell_at = |level: u32| cell * outer_grid::RATIO.pow(level) as f32;
+        let mut flow = Self { cell: cell_at(outer_grid::LEVELS), ambient, ..Self::default() };
         for level in (0..outer_grid::LEVELS).rev() {
-            let cell = wide(level);
+            let cell = cell_at(level);
             flow = Self { cell, ambient, around: Some(Box::new(flow)), ..Self::default() };
         }
         Ok(flow)
@@ -206,8 +206,8 @@ impl Flow {
 
     /// Sets the pressure in the rim from the surrounding air.
     fn take_rim_pressure(&mut self, around: &Self) {
-        let wide = outer_grid::extrapolated(&around.multigrid.finest, &around.pressure);
-        let reader = outer_grid::Reader { tiles: &around.tiles, field: &wide, axis: None, outside: 0.0 };
+        let coarse = outer_grid::extrapolated(&around.multigrid.finest, &around.pressure);
+        let reader = outer_grid::Reader { tiles: &around.tiles, field: &coarse, axis: None, outside: 0.0 };
         let (tiles, active) = (&self.tiles, self.tiles.active());
         let rim = self.pressure[active..].par_iter_mut().enumerate().with_min_len(4);
         rim.for_each_init(window::Window::default, |window, (index, tile)| {

@@ -2,7 +2,7 @@
 //! it, and so on. It provides the pressure and the velocity at the border of the tiles, as if the air continued: one tile of padding is
 //! enough.
 //!
-//! Where both exist, the fine velocity takes precedence: its mean is written into the wide cells before their projection.
+//! Where both exist, the fine velocity takes precedence: its mean is written into the coarse cells before their projection.
 
 use rayon::prelude::*;
 
@@ -16,15 +16,15 @@ use crate::numeric::cpu::dispatch;
 pub const RATIO: i32 = 2;
 /// Number of surrounding flows, one around the other.
 pub const LEVELS: u32 = 3;
-/// Tiles of wide cells around those that hold fine ones.
+/// Tiles of coarse cells around those that hold fine ones.
 const PADDING: i32 = 1;
 
-/// Sorted coordinates of the wide tiles around fine ones.
+/// Sorted coordinates of the coarse tiles around fine ones.
 pub fn tiles_around(fine: &[Coord]) -> Vec<Coord> {
-    let mut wide: Vec<Coord> = fine.iter().map(|coord| coord.map(|x| x.div_euclid(RATIO))).collect();
-    wide.sort_unstable();
-    wide.dedup();
-    padded(&wide, PADDING)
+    let mut coarse: Vec<Coord> = fine.iter().map(|coord| coord.map(|x| x.div_euclid(RATIO))).collect();
+    coarse.sort_unstable();
+    coarse.dedup();
+    padded(&coarse, PADDING)
 }
 
 /// Wide cells along the edge of a fine tile.
@@ -32,8 +32,8 @@ const COARSE_EDGE: usize = 8 / RATIO as usize;
 /// Wide cells in a fine tile.
 const COARSE_CELLS: usize = COARSE_EDGE * COARSE_EDGE * COARSE_EDGE;
 
-/// Writes the mean fine velocity into the wide faces that fine faces of active cells cover.
-pub fn restrict(fine: &Flow, wide: &mut Flow) {
+/// Writes the mean fine velocity into the coarse faces that fine faces of active cells cover.
+pub fn restrict(fine: &Flow, coarse: &mut Flow) {
     let (tiles, velocity) = (&fine.tiles, &fine.velocity);
     for axis in 0..3 {
         let means: Vec<[f32; COARSE_CELLS]> =
@@ -45,9 +45,9 @@ pub fn restrict(fine: &Flow, wide: &mut Flow) {
                 continue;
             }
             let coord = tiles.coords()[slot];
-            let Some(parent) = wide.tiles.find(coord.map(|x| x.div_euclid(RATIO))) else { continue };
+            let Some(parent) = coarse.tiles.find(coord.map(|x| x.div_euclid(RATIO))) else { continue };
             let corner = coord.map(|x| x.rem_euclid(RATIO) as usize * COARSE_EDGE);
-            let tile = &mut wide.velocity[axis][parent as usize];
+            let tile = &mut coarse.velocity[axis][parent as usize];
             for (index, mean) in means.into_iter().enumerate() {
                 let at = position_of(index);
                 // In the rim only the first faces bound active cells.
@@ -59,12 +59,12 @@ pub fn restrict(fine: &Flow, wide: &mut Flow) {
     }
 }
 
-/// Position of a wide cell in a fine tile, from its index.
+/// Position of a coarse cell in a fine tile, from its index.
 fn position_of(index: usize) -> [usize; 3] {
     [index / (COARSE_EDGE * COARSE_EDGE), index / COARSE_EDGE % COARSE_EDGE, index % COARSE_EDGE]
 }
 
-/// Means over the faces of the wide cells in a fine tile.
+/// Means over the faces of the coarse cells in a fine tile.
 fn means_of(tile: &Tile, axis: usize) -> [f32; COARSE_CELLS] {
     std::array::from_fn(|index| {
         let at = position_of(index).map(|x| RATIO as usize * x);
@@ -81,7 +81,7 @@ fn means_of(tile: &Tile, axis: usize) -> [f32; COARSE_CELLS] {
     })
 }
 
-/// Values of a wide field at the faces on an axis, or at the centres, of a fine tile.
+/// Values of a coarse field at the faces on an axis, or at the centres, of a fine tile.
 pub struct Reader<'a> {
     /// Tiles of the field.
     pub tiles: &'a Tiles,
@@ -96,8 +96,8 @@ pub struct Reader<'a> {
 /// Wide cells on an axis that the interpolation of a fine tile reads: those that the tile covers and one on each side.
 const READ: usize = COARSE_EDGE + 2;
 
-/// For each of eight fine positions on an axis: the first of the two wide cells that are read, as an index into [`READ`], and the weight of
-/// the second.
+/// For each of eight fine positions on an axis: the first of the two coarse cells that are read, as an index into [`READ`], and the weight
+/// of the second.
 type Weights = [(usize, f32); 8];
 
 /// Weights of linear interpolation; `is_centre`: values are at the centres on this axis.
@@ -156,7 +156,7 @@ fn interpolate_rows(window: &Window, corner: [i32; 3], weights: &[Weights; 3], o
     }
 }
 
-/// The wide pressure, extrapolated into covered cells: these get the mean of their neighbours.
+/// The coarse pressure, extrapolated into covered cells: these get the mean of their neighbours.
 pub fn extrapolated(operator: &Operator, pressure: &Field) -> Field {
     let takes_part =
         |slot: usize, cell: usize| operator.stencil(slot).is_none_or(|stencil| stencil.inverse[cell] > 0.0);

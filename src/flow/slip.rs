@@ -150,7 +150,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn positions_beside_masks_are_those_with_a_neighbour_in_them() {
+    fn adjacent_positions_have_a_neighbour_in_the_mask() {
         let tiles = Tiles::new(&[[0, 0, 0]]);
         let near = tiles.neighbours()[0];
         let mut state = 1u64;

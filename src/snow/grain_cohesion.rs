@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_height_gives_the_attraction_that_gives_it() {
+    fn wall_of_is_the_inverse_of_of_wall() {
         for (height, repose) in [(0.3, 32.0), (0.1, 38.0), (1.5, 5.0)] {
             let attraction = of_wall(height, 0.005, repose);
             assert!((wall_of(attraction, 0.005, repose) - height).abs() < 1e-9, "{height}");

@@ -168,7 +168,7 @@ impl Heap {
         // Largest travel of the meshes in the step so far (diameters).
         let mut before = 0.0;
         let mut fastest = self.fastest();
-        self.rows.par_iter_mut().for_each(|row| row.limit = 0.0);
+        self.rows.par_iter_mut().for_each(|row| row.travel_limit = 0.0);
         ctx.expect(division.sub_steps);
         for sub in 0..division.sub_steps {
             ctx.check()?;
@@ -186,7 +186,7 @@ impl Heap {
                 layout.count_neighbours(&self.rows);
             }
             let limit = search.fastest(fastest, coefficients.restitution, coefficients.gravity[1]);
-            let motion = Motion { along: travel.along, fastest: limit };
+            let motion = Motion { mesh_displacement: travel.common, fastest: limit };
             fastest = sub_step(ctx, &mut self.rows, &mut layout, &coefficients, motion)?;
             ctx.advance();
         }

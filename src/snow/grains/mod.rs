@@ -280,7 +280,7 @@ impl Grains {
                     )?;
                 }
                 self.heap.step(ctx, division, coefficients, &mut obstacles.colliders)?;
-                let left = self.limit(around.lowest, to - from, frame);
+                let left = self.enforce_limits(around.lowest, to - from, frame);
                 Ok((left, self.heap.resting(), self.heap.fastest()))
             })?;
             // An empty sum is -0.
@@ -350,7 +350,7 @@ impl Grains {
     }
 
     /// Removes grains that are too old, too low or outside the box; returns the counts of those that are too old and too low.
-    fn limit(&mut self, lowest: f64, dt: f64, frame: i32) -> [usize; 2] {
+    fn enforce_limits(&mut self, lowest: f64, dt: f64, frame: i32) -> [usize; 2] {
         let Params { lifetime, keep_box, .. } = self.params;
         let all = self.heap.count();
         if let Some(lifetime) = lifetime {

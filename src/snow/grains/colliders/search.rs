@@ -48,9 +48,9 @@ pub struct Search<'a> {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Travel {
     /// Common displacement (diameters).
-    pub along: V,
-    /// Largest deviation of a vertex from it (diameters).
-    pub beside: f64,
+    pub common: V,
+    /// Largest deviation of a vertex's displacement from it (diameters).
+    pub deviation: f64,
 }
 
 impl Travel {
@@ -61,16 +61,19 @@ impl Travel {
         let bounds = shells.iter().map(|shell| &shell.displacement_bounds);
         let [min, max] = bounds.fold(none, |[min, max], [low, high]| [min.inf(low), max.sup(high)]);
         let middle = (min + max) * 0.5;
-        let beside = 0.5 * (max - min).norm();
-        if middle.norm() + beside > MAX_RATIO * farthest {
-            return Self { along: [0.0; 3], beside: farthest / diameter };
+        let deviation = 0.5 * (max - min).norm();
+        if middle.norm() + deviation > MAX_RATIO * farthest {
+            return Self { common: [0.0; 3], deviation: farthest / diameter };
         }
-        Self { along: [0, 1, 2].map(|axis| (middle[axis] / diameter) as f32), beside: beside / diameter }
+        Self {
+            common: [0, 1, 2].map(|axis| (middle[axis] / diameter) as f32),
+            deviation: deviation / diameter,
+        }
     }
 
     /// Upper bound of the displacement of a vertex (diameters).
     pub fn max(&self) -> f64 {
-        f64::from(norm(self.along)) + self.beside
+        f64::from(norm(self.common)) + self.deviation
     }
 }
 
@@ -101,14 +104,14 @@ impl Search<'_> {
         fastest.max(thrown).max(falls) * (1.0 + ROUNDING)
     }
 
-    /// Whether a mesh may be within `reach` (diameters), according to a stored limit.
+    /// Whether a mesh may be within `reach` (diameters), according to a stored travel limit.
     fn is_within(&self, limit: f32, reach: f64) -> bool {
         f64::from(limit) - self.before < reach
     }
 
     /// Whether a mesh may be near members of a block, according to the block's limit.
     pub fn may_be_near(&self, block: &Block) -> bool {
-        !block.members.is_empty() && self.is_within(block.limit, block_reach() + self.travel.max())
+        !block.members.is_empty() && self.is_within(block.travel_limit, block_reach() + self.travel.max())
     }
 
     /// Touches of the members of a block with meshes. A resting grain has one only if a moving mesh touches it, which wakes it.
@@ -118,7 +121,7 @@ impl Search<'_> {
         // A block that touched a mesh in the last sub-step is still near it.
         if !block.touches.iter().any(Touch::is_of_mesh) {
             let middle = world(block.at, [EDGE * 0.5; 3], self.diameter);
-            block.limit = self.limit(middle, block_reach() + f64::from(EDGE));
+            block.travel_limit = self.travel_limit(middle, block_reach() + f64::from(EDGE));
             if !self.may_be_near(block) {
                 return Vec::new();
             }
@@ -135,9 +138,9 @@ impl Search<'_> {
                 max
             } else {
                 let displacement = scaled(row.velocity, (self.dt / self.diameter) as f32);
-                f64::from(norm(sub(displacement, self.travel.along))) + self.travel.beside
+                f64::from(norm(sub(displacement, self.travel.common))) + self.travel.deviation
             };
-            if self.is_within(row.limit, REACH + closing) && !(row.rests() && max == 0.0) {
+            if self.is_within(row.travel_limit, REACH + closing) && !(row.rests() && max == 0.0) {
                 let position = world(block.at, row.position, self.diameter);
                 bounds = [bounds[0].inf(&position), bounds[1].sup(&position)];
                 // Near fast meshes, a grain would have to search again at once anyway.
@@ -164,7 +167,7 @@ impl Search<'_> {
 
     /// Travel of the meshes (diameters, from the start of the step) before one can reach a position (m), from a search within `within`
     /// diameters.
-    fn limit(&self, position: DVec3, within: f64) -> f32 {
+    fn travel_limit(&self, position: DVec3, within: f64) -> f32 {
         let square =
             |shell: &&Shell| shell.nearest(position, within * self.diameter).map(|found| found.square);
         let nearest = self.shells.iter().filter_map(square).fold(f64::INFINITY, f64::min).sqrt();
@@ -189,7 +192,7 @@ impl Search<'_> {
                 }
             }
         }
-        row.limit = (self.before + free) as f32 - SLACK;
+        row.travel_limit = (self.before + free) as f32 - SLACK;
     }
 }
 
@@ -221,20 +224,20 @@ mod tests {
     }
 
     #[test]
-    fn no_corner_travels_farther_than_along_and_beside() {
-        let [along, still] = [[0.3, -0.2, 0.1], [0.0; 3]];
+    fn common_and_deviation_bound_the_displacement_of_each_corner() {
+        let [common, still] = [[0.3, -0.2, 0.1], [0.0; 3]];
         let cases =
-            [[along; 3], [still; 3], [along, still, still], [[0.2, 0.0, 0.0], [-0.2, 0.0, 0.0], still]];
+            [[common; 3], [still; 3], [common, still, still], [[0.2, 0.0, 0.0], [-0.2, 0.0, 0.0], still]];
         for displacements in cases {
             let shell = moved(displacements);
             let travel = Travel::of(&[&shell], 0.1);
-            let corner = travel.along.map(f64::from);
+            let corner = travel.common.map(f64::from);
             for displacement in displacements {
                 let rest = DVec3::from(displacement) / 0.1 - DVec3::from(corner);
-                assert!(rest.norm() <= travel.beside + 1.0e-6, "{travel:?} for {displacement:?}");
+                assert!(rest.norm() <= travel.deviation + 1.0e-6, "{travel:?} for {displacement:?}");
             }
             assert!(travel.max() <= MAX_RATIO * shell.max_displacement / 0.1 + 1.0e-6, "{travel:?}");
         }
-        assert!(Travel::of(&[&moved([along; 3])], 0.1).beside < 1.0e-6);
+        assert!(Travel::of(&[&moved([common; 3])], 0.1).deviation < 1.0e-6);
     }
 }

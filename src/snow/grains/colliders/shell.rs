@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use super::touch::{FIRST_SHELL, Touch};
 use crate::geometry::DVec3;
 use crate::numeric::lanes::LANES;
+use crate::snow::bounds::bounds;
 use crate::snow::grains::solver::rows::{Row, dot};
 
 /// Vertices whose displacements one task measures.
@@ -139,10 +140,7 @@ impl Shell {
     /// Sorts triangles along a Z-order curve, so that those of a leaf are close together.
     fn sort(&mut self) {
         let spread = |x: u64| (0..16).fold(0u64, |out, bit| out | (x >> bit & 1) << (3 * bit));
-        let (mut low, mut high) = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
-        for position in &self.now {
-            (low, high) = (low.inf(position), high.sup(position));
-        }
+        let [low, high] = bounds(&self.now);
         let size = (high - low).max().max(1.0e-9);
         let now = &self.now;
         self.triangles.par_sort_by_cached_key(|triangle| {

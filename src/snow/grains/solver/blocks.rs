@@ -43,7 +43,7 @@ pub struct Block {
     /// Touches of members, sorted by slot and collider.
     pub touches: Vec<Touch>,
     /// Distance (diameters) that meshes may travel from the start of the step before one can touch a member.
-    pub limit: f32,
+    pub travel_limit: f32,
     /// Whether a member is awake.
     pub is_awake: bool,
     /// Whether contacts of its members can matter: it or a neighbour is awake.

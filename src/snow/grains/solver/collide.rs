@@ -280,7 +280,7 @@ mod tests {
     use crate::snow::grains::params::Division;
 
     /// Velocities (m/s) of a grain and of another that lands on it at 1 m/s, both supported.
-    fn met(attraction: f32) -> [f32; 2] {
+    fn velocities_after_landing(attraction: f32) -> [f32; 2] {
         let params = Params { gravity: 0.0, friction: 0.0, rests: false, ..Params::for_cell(1.5) };
         let mut heap = Heap::new(2.0 * params.radius);
         for (id, speed) in [(0, 0.0), (1, -1.0)] {
@@ -298,10 +298,10 @@ mod tests {
     }
 
     #[test]
-    fn the_upper_of_two_grains_that_are_held_is_the_lighter_one_but_where_they_attract() {
-        let [lower, upper] = met(0.0);
+    fn the_upper_of_two_supported_grains_is_lighter_unless_they_attract() {
+        let [lower, upper] = velocities_after_landing(0.0);
         assert!((lower + 0.4).abs() < 1.0e-5 && (upper + 0.4).abs() < 1.0e-5, "{lower} {upper}");
-        let [lower, upper] = met(1.0e-9);
+        let [lower, upper] = velocities_after_landing(1.0e-9);
         assert!((lower + 0.5).abs() < 1.0e-5 && (upper + 0.5).abs() < 1.0e-5, "{lower} {upper}");
     }
 }

@@ -432,7 +432,7 @@ mod tests {
     }
 
     #[test]
-    fn grains_at_one_place_spread_and_stay_above_the_floor() {
+    fn grains_at_one_position_spread_and_stay_above_the_floor() {
         let positions = spread(&[DVec3::new(0.3, 0.6, -0.2); 3000], None);
         assert!(fullest(&positions) <= MAX_IN_CELL, "{}", fullest(&positions));
         assert!(positions.iter().all(|position| position.y >= 0.5), "one is in the floor");

@@ -142,7 +142,7 @@ impl Layout {
             anchors: Default::default(),
             skin: SKIN,
             touches: Vec::new(),
-            limit: 0.0,
+            travel_limit: 0.0,
             is_awake: false,
             is_reached: false,
             has_strayed: true,

@@ -30,7 +30,7 @@ pub struct Row {
     /// as moving.
     pub reference: V,
     /// Distance (diameters) that meshes may travel from the start of the step before one can touch it.
-    pub limit: f32,
+    pub travel_limit: f32,
 }
 
 /// Added to `mass_state`: supported.

@@ -29,7 +29,7 @@ use crate::snow::grains::colliders::touch::Touch;
 #[derive(Debug, Clone, Copy)]
 pub struct Motion {
     /// Common displacement of the meshes (diameters).
-    pub along: V,
+    pub mesh_displacement: V,
     /// Maximum speed (m/s) that contacts may give a grain, not counting gravity.
     pub fastest: f32,
 }
@@ -209,8 +209,8 @@ fn advance_grain(row: &mut Row, c: &Coefficients, motion: &Motion) {
     }
     let displacement = add(scaled(row.velocity, c.dt / c.diameter), row.push);
     row.position = add(row.position, displacement);
-    // The travel of the meshes, which uses up the limit, includes `along`.
-    row.limit += norm(motion.along) - norm(sub(displacement, motion.along));
+    // The travel that is compared with the limit includes that of the common displacement, though the grain may move along.
+    row.travel_limit += norm(motion.mesh_displacement) - norm(sub(displacement, motion.mesh_displacement));
     // Its square may be over 0 in diameters and underflow to 0 in m/s.
     let back = scaled(row.push, c.diameter / c.dt);
     let square = dot(back, back);
@@ -361,7 +361,7 @@ mod tests {
     fn a_push_of_any_length_leaves_a_finite_velocity() {
         let params = Params { radius: 0.000_75, ..Params::for_cell(0.005) };
         let c = params.coefficients(&Division { dt: 1.0 / 24.0, sub_steps: 24 });
-        let motion = Motion { along: [0.0; 3], fastest: f32::INFINITY };
+        let motion = Motion { mesh_displacement: [0.0; 3], fastest: f32::INFINITY };
         let _flush = FlushDenormals::begin();
         let mut push = 1.0e-24;
         while push < 1.0 {

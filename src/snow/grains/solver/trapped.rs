@@ -99,7 +99,7 @@ impl StepEnd<'_> {
         field: Option<&CachedField<'_>>,
     ) -> Vec<u32> {
         let block = &self.layout.blocks[index];
-        let has_mesh = f64::from(block.limit) - self.travelled < block_reach();
+        let has_mesh = f64::from(block.travel_limit) - self.travelled < block_reach();
         let is_deep = |touch: &&Touch| {
             let row = &rows[touch.grain as usize];
             if !touch.has_plane() {
@@ -111,7 +111,7 @@ impl StepEnd<'_> {
         };
         let was_pushed_in = |slot: &&u32| {
             let row = &rows[**slot as usize];
-            let is_in_mesh = || row.limit > 0.0 && f64::from(row.limit) - self.travelled < 0.5;
+            let is_in_mesh = || row.travel_limit > 0.0 && f64::from(row.travel_limit) - self.travelled < 0.5;
             let is_in_field = || {
                 let distance = field.and_then(|field| field.distance(index, block.at, row.position));
                 distance.is_some_and(|distance| distance < 0.5)

@@ -22,7 +22,7 @@ use crate::snow::bounds::bounds;
 use crate::snow::grains::colliders::shell::Shell;
 use crate::snow::grains::{FASTEST_OBJECT, MAX_CLOSED_HOLES};
 use crate::sweep::{self, Body, Settings};
-use crate::vdb::FloatGrid;
+use crate::vdb::{FloatGrid, level_set};
 use corners::{Grid, Lattice};
 
 /// The surroundings that mist flows around in a step.
@@ -271,15 +271,8 @@ impl Walls<'_> {
                 None => (near, 0.0, None),
             };
         if swept.is_none() || from < share {
-            let lattice = Lattice { cell: self.cell, parts: self.parts() };
-            let settings = Settings::new(lattice.spacing());
-            for body in near.iter().map(|body| &self.bodies[*body]) {
-                let [from, to] = [from, share].map(|share| self.time(body, share));
-                let more = sweep::chain(ctx, std::slice::from_ref(body.body), from, to, &settings)?;
-                match &mut swept {
-                    None => swept = Some(more),
-                    Some(swept) => crate::vdb::level_set::union(ctx, swept, more)?,
-                }
+            for body in &near {
+                self.add_sweep(ctx, &mut swept, &self.bodies[*body], [from, share])?;
             }
         }
         *cache = swept.map(|swept| Opened { share, near, swept });
@@ -292,18 +285,30 @@ impl Walls<'_> {
 
     /// The level set of the objects that have an inside.
     fn solid(&self, ctx: &Context, near: &[usize], share: f64) -> Result<Option<FloatGrid>> {
-        let lattice = Lattice { cell: self.cell, parts: self.parts() };
-        let settings = Settings::new(lattice.spacing());
-        let mut out: Option<FloatGrid> = None;
+        let mut out = None;
         for body in near.iter().map(|body| &self.bodies[*body]).filter(|body| !body.is_sheet) {
-            let time = self.time(body, share);
-            let grid = sweep::chain(ctx, std::slice::from_ref(body.body), time, time, &settings)?;
-            match &mut out {
-                None => out = Some(grid),
-                Some(out) => crate::vdb::level_set::union(ctx, out, grid)?,
-            }
+            self.add_sweep(ctx, &mut out, body, [share; 2])?;
         }
         Ok(out)
+    }
+
+    /// Adds the volume that an object sweeps between two shares 0..=1 of the step to a level set.
+    fn add_sweep(
+        &self,
+        ctx: &Context,
+        to: &mut Option<FloatGrid>,
+        body: &StepBody<'_>,
+        shares: [f64; 2],
+    ) -> Result<()> {
+        let lattice = Lattice { cell: self.cell, parts: self.parts() };
+        let [first, last] = shares.map(|share| self.time(body, share));
+        let settings = Settings::new(lattice.spacing());
+        let swept = sweep::chain(ctx, std::slice::from_ref(body.body), first, last, &settings)?;
+        match to {
+            None => *to = Some(swept),
+            Some(to) => level_set::union(ctx, to, swept)?,
+        }
+        Ok(())
     }
 
     /// The triangles of an object, with their displacements over the preceding [`INSTANT`].
