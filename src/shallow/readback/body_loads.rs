@@ -96,10 +96,10 @@ impl Shallow {
             levels: 0.0,
             bases: 0.0,
         };
-        body.each(grid, heights, |cell, solid| feeling.pillar(cell, solid));
+        body.each_cell(grid, heights, |cell, solid| feeling.pillar(cell, solid));
         let around = [feeling.levels, feeling.bases].map(|sum| sum / feeling.contact);
         let mut units = 0.0;
-        body.each(grid, heights, |cell, solid| units += self.under(cell, solid, around));
+        body.each_cell(grid, heights, |cell, solid| units += self.under(cell, solid, around));
         Load {
             pressure: feeling.pressure.into(),
             drag: feeling.drag.into(),

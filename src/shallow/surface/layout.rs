@@ -1,4 +1,4 @@
-//! What a surface is made of, how it is laid out, and where it is written.
+//! Input of a surface, the layout of its mesh, and the buffers for it.
 
 use super::counts::Counts;
 use super::rim::ledges::Ledges;
@@ -23,7 +23,7 @@ pub struct Depths<'a> {
     pub sunk: &'a [i32],
     /// One number per index for each array of [`Target::carried`]: concentrations of scalars. May be empty.
     pub carried: [&'a [f32]; MAX_SCALARS],
-    /// Where the surface ends above nothing and is extended down to the ground's edge; if absent, it ends in the middle of the last cell.
+    /// Adds skirts at ledges, down to the ground's edge; if absent, the surface ends in the middle of the last cell.
     pub ledges: Option<&'a Ledges>,
 }
 
@@ -120,13 +120,13 @@ pub struct Target<'a> {
 }
 
 impl Target<'_> {
-    /// Checks that everything wanted is given.
+    /// Checks that the liquid has what the buffers are for.
     pub(in crate::shallow) fn check_wanted(&self, depths: &Depths<'_>) -> Result<()> {
         if self.velocities.is_some() && depths.velocity.is_empty() && !depths.depth.is_empty() {
             return Err(Error::argument("velocities of the surface are wanted, and the liquid has none"));
         }
-        let is_bare = |(to, from): (&Option<&mut [f32]>, &&[f32])| to.is_some() && from.is_empty();
-        if !depths.depth.is_empty() && self.carried.iter().zip(&depths.carried).any(is_bare) {
+        let is_missing = |(to, from): (&Option<&mut [f32]>, &&[f32])| to.is_some() && from.is_empty();
+        if !depths.depth.is_empty() && self.carried.iter().zip(&depths.carried).any(is_missing) {
             return Err(Error::argument("concentrations of the surface are wanted, and the liquid has none"));
         }
         Ok(())
@@ -151,7 +151,7 @@ impl Target<'_> {
     }
 }
 
-/// Checks that a mesh fits its buffers, each given by its name, its length if there is one, and how much is needed.
+/// Checks that a mesh fits its buffers; of each are given its name, its length (none if it is absent), and the length needed.
 pub(in crate::shallow) fn check_buffers<'a>(
     mesh_has: &str,
     counts: &Counts,

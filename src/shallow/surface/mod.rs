@@ -10,7 +10,7 @@
 //! | linked | two columns of neighbouring cells (8), one of them wet, where each one's room holds the other's height |
 //! | quartet | the columns of 2 x 2 cells, named by the north-west cell (minimum x and z) |
 //! | group | four columns of a quartet in which every pair that includes a wet column is linked; or three such columns, if they are not part of a group of four |
-//! | full | a quartet whose four columns on a layer are a group is full on this layer |
+//! | full | a quartet is full on a layer if its four columns there are a group |
 //! | odd | a quartet with a wet column that is in no full group; it is searched for groups column by column |
 //! | wall | a column at whose solid a neighbour's surface ends, below the neighbour's ceiling |
 //! | extra | a vertex within a wall, to which the surface that ends there is extended |
@@ -20,8 +20,8 @@
 //! along the wet one; otherwise along the one with the larger sum of heights, and if these are equal from north-west to south-east. The
 //! surface ends at the centres of the outermost cells.
 //!
-//! Four columns that lack one link, between two cells side by side, are no group of four but two groups of three, whose triangles overlap
-//! ([`Check::doubled`]): the liquid of these columns is on different layers there.
+//! If of four columns only two in cells side by side are not linked, there are two groups of three, whose triangles overlap
+//! ([`Check::doubled`]): the liquid splits into two layers there.
 
 pub(super) mod buffers;
 pub mod counts;
@@ -39,26 +39,25 @@ use buffers::normals::Normals;
 use buffers::vertices::Vertices;
 pub use counts::Counts;
 pub use layout::{Depths, Indices, Layout, Target, Up};
-use quartets::links::Scene;
+use quartets::links::LiquidColumns;
 use quartets::odd::Search;
 use quartets::strips::Found;
-use rim::boundary::{Around, Walls};
+use rim::boundary::{Stencil, Walls};
 use rim::skirts::Skirts;
 pub use self_check::{Check, check};
 
 /// Builds surfaces; reuses its memory.
 #[derive(Debug, Default)]
 pub struct Surface {
-    /// For each strip, the strip above it, in the columns given to the last `reserve`, or, if there was none, to the first call that needed
-    /// it.
+    /// As in [`LiquidColumns`]; of the columns given to the last `reserve` or, without it, to the first call.
     above: Vec<u32>,
     found: Found,
     walls: Walls,
     skirts: Skirts,
     search: Search,
     normals: Normals,
-    around: Around,
-    /// Height (units) at which each index is drawn: see `heights/shown.rs`.
+    stencil: Stencil,
+    /// Height (units) at which each index is shown: see `heights/shown.rs`.
     heights: Vec<i32>,
 }
 
@@ -73,7 +72,7 @@ impl Surface {
         self.walls.reserve(buffers::capacity::Walls::of(columns).pairs, layers);
         let [nx, nz] = columns.grid.size;
         self.search.reserve(layers, (nx - 1) * (nz - 1), bound(columns).indices / 3);
-        self.around.reserve();
+        self.stencil.reserve();
     }
 
     /// Size of the mesh that [`Surface::build`] would write.
@@ -101,22 +100,23 @@ impl Surface {
         if self.above.len() != len / STRIP {
             quartets::links::find_above(columns, &mut self.above);
         }
-        let scene = Scene { columns, depth: depths.depth, above: &self.above };
+        let liquid = LiquidColumns { columns, depth: depths.depth, above: &self.above };
         self.found.reset(columns);
         self.walls.clear();
-        quartets::full::find_wet(scene, depths.active, &mut self.found);
-        quartets::full::find_full(scene, &mut self.found);
+        quartets::full::find_wet(liquid, depths.active, &mut self.found);
+        quartets::full::find_full(liquid, &mut self.found);
         let mut triangles = self.found.full_triangles;
-        triangles += quartets::odd::find_groups(scene, &mut self.found, &mut self.walls, &mut self.search);
+        triangles += quartets::odd::find_groups(liquid, &mut self.found, &mut self.walls, &mut self.search);
         let columns_used = self.found.number(columns);
         let extras = self.walls.number(columns_used);
         self.found.has_means |= extras > 0;
         let vertices = columns_used + extras;
-        let [hems, skirts] = self.skirts.find(scene, &self.found, &self.search, depths.ledges, vertices);
+        let [skirt_vertices, skirt_indices] =
+            self.skirts.find(liquid, &self.found, &self.search, depths.ledges, vertices);
         Ok(Counts {
-            vertices: vertices as usize + hems,
+            vertices: vertices as usize + skirt_vertices,
             extras: extras as usize,
-            indices: 3 * triangles + skirts,
+            indices: 3 * triangles + skirt_indices,
         })
     }
 
@@ -137,10 +137,10 @@ impl Surface {
         target.check_wanted(depths)?;
         let counts = self.count(columns, depths)?;
         target.check(&counts)?;
-        let scene = Scene { columns, depth: depths.depth, above: &self.above };
+        let liquid = LiquidColumns { columns, depth: depths.depth, above: &self.above };
         let (found, walls, flipped) = (&self.found, &self.walls.list, layout.left_handed);
         let at = buffers::indices::write_triangles(
-            scene,
+            liquid,
             found,
             walls,
             &self.search,
@@ -151,9 +151,9 @@ impl Surface {
         self.normals.reset(columns);
         heights::shown::find_heights(columns, found, depths, layout, &mut self.heights);
         let vertices =
-            Vertices::new(scene, found, walls, &self.heights, depths, layout, target.normals.is_some());
-        vertices.write(&mut self.normals, &mut self.around, target);
-        self.skirts.write_hems(&vertices, target);
+            Vertices::new(liquid, found, walls, &self.heights, depths, layout, target.normals.is_some());
+        vertices.write(&mut self.normals, &mut self.stencil, target);
+        self.skirts.write_vertices(&vertices, target);
         self.normals.clear(found);
         Ok(counts)
     }

@@ -1,6 +1,6 @@
 //! Checks a mesh against the links of the columns, one by one.
 
-use super::quartets::links::Scene;
+use super::quartets::links::LiquidColumns;
 use super::{Columns, NONE};
 
 /// What [`check`] counts.
@@ -19,7 +19,7 @@ pub struct Check {
 ///
 /// Slow: for tests.
 pub fn check(columns: &Columns, depth: &[i32], vertex_columns: &[u32], indices: &[u32]) -> Check {
-    let scene = Scene { columns, depth, above: &[] };
+    let liquid = LiquidColumns { columns, depth, above: &[] };
     let mut edges: Vec<[u32; 2]> = Vec::with_capacity(indices.len());
     for [a, b, c] in indices.as_chunks::<3>().0 {
         edges.extend([[*a, *b], [*b, *c], [*c, *a]]);
@@ -35,9 +35,9 @@ pub fn check(columns: &Columns, depth: &[i32], vertex_columns: &[u32], indices: 
         joined.binary_search(&[a, b]).is_ok() || joined.binary_search(&[b, a]).is_ok()
     };
     let mut out = Check { doubled, ..Check::default() };
-    for own in columns.indices().filter(|&index| scene.is_wet(index)) {
+    for own in columns.indices().filter(|&index| liquid.is_wet(index)) {
         for step in [[1, 0], [0, 1]] {
-            let Some(other) = scene.wet_beside(own, step) else { continue };
+            let Some(other) = liquid.wet_beside(own, step) else { continue };
             if is_joined(own, other) {
                 continue;
             }
@@ -46,8 +46,9 @@ pub fn check(columns: &Columns, depth: &[i32], vertex_columns: &[u32], indices: 
             let has_third = sides.into_iter().any(|side| {
                 let steps = [side, [side[0] + step[0], side[1] + step[1]]];
                 steps.into_iter().any(|third| {
-                    let third = scene.beside(own, third, scene.height(own));
-                    third.is_some_and(|third| scene.are_linked(own, third) && scene.are_linked(other, third))
+                    let third = liquid.beside(own, third, liquid.height(own));
+                    third
+                        .is_some_and(|third| liquid.are_linked(own, third) && liquid.are_linked(other, third))
                 })
             });
             if has_third {

@@ -8,11 +8,11 @@ use crate::shallow::columns::grid::{Heights, TOP};
 
 /// A triangle that lines may cross.
 pub struct Facet {
-    /// In the triangle's order, starting with the one whose height is unique: the lowest, or the highest where two are lowest.
+    /// In the triangle's order, starting with the lowest one, or with the highest if the lowest height is not unique.
     pub corners: [Corner; 3],
     /// Minimum and maximum height (m).
     range: [f64; 2],
-    /// Up to this, rounding may change the sign of an area (m2, twice).
+    /// Up to this magnitude, rounding may change the sign of an area (m2, twice).
     doubt: f64,
     /// In a triangle of at most this area (m2, twice), rounding may move a height by 2^-8 units.
     rough: f64,
@@ -21,9 +21,9 @@ pub struct Facet {
 /// How several lines lie relative to a triangle.
 #[derive(Default)]
 pub struct Crossed {
-    /// How far they are inside and outside it (m2, as areas).
-    within: [f64; LANES],
-    beside: [f64; LANES],
+    /// How far they are inside it, and outside it, measured as areas (m2, twice).
+    inside: [f64; LANES],
+    outside: [f64; LANES],
     /// Its area (m2, twice), negative if it faces up.
     area: [f64; LANES],
     /// Height (units), clamped to the range and rounded, for [`integer_of`].
@@ -76,7 +76,7 @@ impl Facet {
         Some((height, !is_left))
     }
 
-    /// Computes what [`Facet::one_of`] returns, for several lines.
+    /// Tests several lines at once; [`Facet::crossing_of`] has the result for each.
     #[inline(always)]
     pub fn cross_all(&self, x: &[f64; LANES], z: &[f64; LANES], heights: &Heights, out: &mut Crossed) {
         let [r, p, q] = self.corners;
@@ -85,10 +85,10 @@ impl Facet {
             let [r, p, q] = [from(r), from(p), from(q)];
             let [a, b, c] = [cross(p, q), cross(q, r), cross(r, p)];
             let sum = (b + c) + a;
-            let least = min(min(a, b), c);
-            let greatest = max(max(a, b), c);
-            out.within[lane] = max(least, -greatest);
-            out.beside[lane] = min(greatest, -least);
+            let smallest = min(min(a, b), c);
+            let largest = max(max(a, b), c);
+            out.inside[lane] = max(smallest, -largest);
+            out.outside[lane] = min(largest, -smallest);
             out.area[lane] = sum;
             // As `Heights::round`: halves are rounded up.
             let units = (self.height([b, c], sum) - heights.low) / heights.unit;
@@ -99,13 +99,19 @@ impl Facet {
         }
     }
 
-    /// For one of several lines, the height (units) at which it crosses the triangle, and whether the triangle faces up there.
+    /// For one of the lines of [`Facet::cross_all`], the height (units) at which it crosses the triangle, and whether the triangle faces up.
     #[inline(always)]
-    pub fn one_of(&self, lane: usize, all: &Crossed, at: [f64; 2], heights: &Heights) -> Option<(u32, bool)> {
+    pub fn crossing_of(
+        &self,
+        lane: usize,
+        all: &Crossed,
+        at: [f64; 2],
+        heights: &Heights,
+    ) -> Option<(u32, bool)> {
         let area = all.area[lane];
-        if all.within[lane] > self.doubt && area.abs() > self.rough {
+        if all.inside[lane] > self.doubt && area.abs() > self.rough {
             Some((integer_of(all.units[lane]), area < 0.0))
-        } else if all.beside[lane] > self.doubt {
+        } else if all.outside[lane] > self.doubt {
             // Weights of both signs, beyond doubt.
             None
         } else {
@@ -113,7 +119,7 @@ impl Facet {
         }
     }
 
-    /// The same where the sign of a weight is in doubt.
+    /// As [`Facet::cross`], where the sign of a weight is in doubt.
     #[inline(never)]
     fn cross_exactly(&self, at: [f64; 2], mut weights: [f64; 3]) -> Option<(f64, bool)> {
         let mut sides = [false; 3];
@@ -123,7 +129,7 @@ impl Facet {
                 *weight = exact_cross(a, b, at);
             }
             sides[corner] = match *weight {
-                // What the shift adds: first -e times the edge's z, then e^2 times its x.
+                // On the edge the symbolic shift decides: it adds -e times the edge's z and, if that is 0, e^2 times its x.
                 0.0 if a[1] != b[1] => b[1] < a[1],
                 0.0 => b[0] > a[0],
                 weight => weight > 0.0,
@@ -175,9 +181,8 @@ fn along(a: &Corner, b: &Corner, at: [f64; 2]) -> f64 {
     if low[1] == high[1] {
         return low[1];
     }
-    let way = [high[0] - low[0], high[2] - low[2]];
-    let part =
-        if way[0].abs() >= way[1].abs() { (at[0] - low[0]) / way[0] } else { (at[1] - low[2]) / way[1] };
+    let [dx, dz] = [high[0] - low[0], high[2] - low[2]];
+    let part = if dx.abs() >= dz.abs() { (at[0] - low[0]) / dx } else { (at[1] - low[2]) / dz };
     low[1] + part * (high[1] - low[1])
 }
 
@@ -215,7 +220,7 @@ pub fn exact_cross(a: [f64; 2], b: [f64; 2], s: [f64; 2]) -> f64 {
     sum.value()
 }
 
-/// (a - s) (b - t), if exact in f64: the differences have no rounding error, and are zero or have up to 26 bits.
+/// (a - s) (b - t), if exact in f64: a difference is zero, or both are without rounding error and have up to 26 bits.
 fn exact_product([a, s, b, t]: [f64; 4]) -> Option<f64> {
     let (p, q) = (a - s, b - t);
     if p == 0.0 || q == 0.0 {
@@ -317,7 +322,7 @@ mod tests {
         assert_eq!(exact_cross([0.0, near], [far, near], [1.0, near]), 0.0);
     }
 
-    /// Corners on a ring around a line, some of them beside it or on it exactly.
+    /// A fan around the line at (0.25, 0.25), whose spokes pass exactly through other lines.
     #[test]
     fn a_fan_is_crossed_once_even_at_its_hub_and_its_spokes() {
         let lines = |positions: &[f64]| Lines::new(positions.iter().copied(), 0.5, 4.0);

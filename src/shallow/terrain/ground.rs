@@ -1,4 +1,4 @@
-//! The terrain's own solids below moving shapes, so that shapes move without casting the terrain again.
+//! The terrain's own solids, kept apart from those of moving shapes, so that shapes move without casting the terrain again.
 
 use std::ops::Range;
 
@@ -6,15 +6,15 @@ use super::shapes::Shape;
 use super::solids::{Solid, unite};
 use crate::shallow::columns::grid::{Cells, Grid, Heights};
 
-/// Solids of cells, one after another.
+/// Lists of solids, cell by cell.
 #[derive(Debug, Clone, Default)]
-struct Listed {
+struct CellSolids {
     /// Where each cell's solids begin, and the end of the last.
     starts: Vec<u32>,
     solids: Vec<Solid>,
 }
 
-impl Listed {
+impl CellSolids {
     fn clear(&mut self) {
         self.starts.clear();
         self.starts.push(0);
@@ -45,13 +45,14 @@ impl Listed {
 pub struct Ground {
     bodies: Vec<Shape>,
     /// Solids of every cell (`Grid::index`), while there are shapes.
-    own: Listed,
+    own: CellSolids,
     /// Scratch buffer in which `own` is rebuilt.
-    spare: Listed,
+    rebuilt: CellSolids,
     /// The solids of some cells, united with those of the shapes.
-    united: Listed,
-    /// Shapes over the cells of a row, with their cells along x.
-    near: Vec<(usize, Range<usize>)>,
+    united: CellSolids,
+    /// Shapes over the current row of cells, with their cells along x.
+    in_row: Vec<(usize, Range<usize>)>,
+    /// Scratch: the solids of one cell.
     cell: Vec<Solid>,
 }
 
@@ -61,12 +62,12 @@ impl Ground {
         &self.bodies
     }
 
-    /// Sets the shapes; calls `see` with the boxes of cells that a changed shape may have covered before, or may cover now.
-    pub fn set_bodies(&mut self, grid: &Grid, bodies: &[Shape], mut see: impl FnMut(Cells)) {
+    /// Sets the shapes; calls `visit` with the boxes of cells that a changed shape may have covered before, or may cover now.
+    pub fn set_bodies(&mut self, grid: &Grid, bodies: &[Shape], mut visit: impl FnMut(Cells)) {
         for index in 0..bodies.len().max(self.bodies.len()) {
             let (old, new) = (self.bodies.get(index), bodies.get(index));
             if old != new {
-                old.into_iter().chain(new).for_each(|shape| see(shape.cells(grid)));
+                old.into_iter().chain(new).for_each(|shape| visit(shape.cells(grid)));
             }
         }
         bodies.clone_into(&mut self.bodies);
@@ -86,49 +87,49 @@ impl Ground {
     /// Replaces the solids of a box of cells by those of `cast`, one cell after another, row by row along x.
     pub fn replace<'a>(&mut self, grid: &Grid, [across, rows]: &Cells, cast: impl Fn(usize) -> &'a [Solid]) {
         let nx = grid.size[0];
-        let Self { own, spare, .. } = self;
-        spare.clear();
-        spare.add(own, 0..rows.start * nx);
+        let Self { own, rebuilt, .. } = self;
+        rebuilt.clear();
+        rebuilt.add(own, 0..rows.start * nx);
         let mut next = 0;
         for row in rows.clone() {
-            spare.add(own, row * nx..row * nx + across.start);
+            rebuilt.add(own, row * nx..row * nx + across.start);
             for _ in across.clone() {
-                spare.solids.extend_from_slice(cast(next));
-                spare.end_cell();
+                rebuilt.solids.extend_from_slice(cast(next));
+                rebuilt.end_cell();
                 next += 1;
             }
-            spare.add(own, row * nx + across.end..(row + 1) * nx);
+            rebuilt.add(own, row * nx + across.end..(row + 1) * nx);
         }
-        spare.add(own, rows.end * nx..grid.cells());
-        std::mem::swap(own, spare);
+        rebuilt.add(own, rows.end * nx..grid.cells());
+        std::mem::swap(own, rebuilt);
     }
 
-    /// Unites the solids of some cells (x, z), row by row along x, with those of the shapes, except in cells that are `apart`.
+    /// Unites the solids of some cells (x, z), row by row along x, with those of the shapes, except in excluded cells.
     pub fn unite(
         &mut self,
         grid: &Grid,
         heights: &Heights,
         cells: impl Iterator<Item = [usize; 2]>,
-        apart: impl Fn([usize; 2]) -> bool,
+        is_excluded: impl Fn([usize; 2]) -> bool,
     ) {
         let mut last = None;
         self.united.clear();
         for [x, z] in cells {
             if last != Some(z) {
                 last = Some(z);
-                self.near.clear();
+                self.in_row.clear();
                 for (index, shape) in self.bodies.iter().enumerate() {
                     let [across, rows] = shape.cells(grid);
                     if rows.contains(&z) && !across.is_empty() {
-                        self.near.push((index, across));
+                        self.in_row.push((index, across));
                     }
                 }
             }
             let own = self.own.cell(grid.index([x, z]));
             self.cell.clear();
-            let over = self.near.iter().filter(|(_, across)| across.contains(&x));
+            let over = self.in_row.iter().filter(|(_, across)| across.contains(&x));
             let solid = |(index, _): &(usize, _)| self.bodies[*index].solid(grid.centre([x, z]), heights);
-            if !apart([x, z]) {
+            if !is_excluded([x, z]) {
                 self.cell.extend(over.filter_map(solid));
             }
             if self.cell.is_empty() {
@@ -142,7 +143,7 @@ impl Ground {
         }
     }
 
-    /// The united solids of a cell, by its rank among these cells.
+    /// The united solids of a cell, by its rank among the cells given to [`Ground::unite`].
     pub fn united(&self, rank: usize) -> &[Solid] {
         self.united.cell(rank)
     }

@@ -1,4 +1,4 @@
-//! Solids of height fields: each cell is solid from its height down without end.
+//! Solids of height fields: each cell is solid from its height down to [`BOTTOMLESS`].
 
 use super::Solids;
 use crate::error::{Error, Result};
@@ -26,7 +26,7 @@ pub fn solids(tops: impl ExactSizeIterator<Item = f64>, grid: Grid, heights: Hei
     Ok(out)
 }
 
-/// One solid per cell, from a grey image that lies on the ground.
+/// One solid per cell, from an image of heights.
 ///
 /// # Errors
 /// `Argument`: as [`solids`] and [`Image::validate`].
@@ -38,7 +38,7 @@ pub fn of_image(image: &Image<'_>, grid: Grid, heights: Heights) -> Result<Solid
     solids(tops, grid, heights)
 }
 
-/// A grey image on the ground, whose values are heights.
+/// A grey image that lies in the (x, z) plane, whose values are heights.
 #[derive(Debug, Clone, Copy)]
 pub struct Image<'a> {
     /// Values of the pixels, row by row along x, the first row at the minimum z: 0 is black and 1 is white.
@@ -85,19 +85,19 @@ impl Image<'_> {
         let [x, z] = [0, 1].map(|axis| self.beside(axis, at[axis]));
         let grey = |x: usize, z: usize| f64::from(self.greys[z * self.size[0] + x]);
         let greys = [0, 1].map(|j| [0, 1].map(|i| grey(x[i].0, z[j].0)));
-        let least = greys.as_flattened().iter().fold(f64::INFINITY, |least, grey| least.min(*grey));
+        let min = greys.as_flattened().iter().fold(f64::INFINITY, |min, grey| min.min(*grey));
         // Differences from the minimum, so that a uniform image stays uniform.
-        let part = |i: usize, j: usize| x[i].1 * z[j].1 * (greys[j][i] - least);
-        let grey = least + ((part(0, 0) + part(1, 1)) + (part(1, 0) + part(0, 1)));
+        let part = |i: usize, j: usize| x[i].1 * z[j].1 * (greys[j][i] - min);
+        let grey = min + ((part(0, 0) + part(1, 1)) + (part(1, 0) + part(0, 1)));
         let [black, white] = self.levels;
         black + grey * (white - black)
     }
 
-    /// The two pixels between whose centres a coordinate lies, and their weights; the same pixel twice if it has all of the weight.
+    /// The two pixels between whose centres a coordinate lies, and their weights; the same pixel twice if its weight is 1.
     fn beside(&self, axis: usize, position: f64) -> [(usize, f64); 2] {
         let (count, last) = (self.size[axis] as f64, self.size[axis] - 1);
         let pixel = self.extent[axis] / count;
-        // Relative to the middle of the image, about which mirroring swaps first and last.
+        // Relative to the middle of the image, so that mirroring about it changes only signs.
         let position = position - (self.corner[axis] + self.extent[axis] / 2.0);
         let centre = |index: usize| (index as f64 + 0.5 - count / 2.0) * pixel;
         let first = (position / pixel + (count - 1.0) / 2.0).floor().clamp(0.0, last as f64) as usize;

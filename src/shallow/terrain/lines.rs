@@ -1,6 +1,6 @@
 //! The vertical lines through the cells of a grid, and which of them a triangle may cross.
 
-/// Positions that are tested together.
+/// Count of lines that are tested together.
 pub const LANES: usize = 4;
 
 /// Unit roundoff of f64.
@@ -19,7 +19,7 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Lines at strictly ascending coordinates; `reach` bounds them and the origin that they are measured from.
+    /// Lines at strictly ascending coordinates; `reach` bounds the magnitude of these and of the grid's origin.
     pub fn new(centres: impl Iterator<Item = f64>, cell: f64, reach: f64) -> Self {
         let mut positions = vec![f64::NEG_INFINITY];
         positions.extend(centres);
@@ -39,8 +39,8 @@ impl Lines {
         self.positions[line as usize + 1..].first_chunk().expect("infinities follow the last line")
     }
 
-    /// A coordinate in lines, with rounding errors.
-    fn lines_to(&self, position: f64) -> f64 {
+    /// A coordinate (m) converted to a count of lines after the first, with rounding errors.
+    fn in_lines(&self, position: f64) -> f64 {
         (position - self.positions[1]) * self.inverse
     }
 
@@ -48,8 +48,8 @@ impl Lines {
     /// lines from the minimum rank of its corners to the line before the maximum.
     #[inline]
     pub fn rank(&self, position: f64) -> u32 {
-        // Usually right.
-        let guess = min(max(self.lines_to(position) + 1.0, 0.0), self.count as f64);
+        // A guess that is usually right.
+        let guess = min(max(self.in_lines(position) + 1.0, 0.0), self.count as f64);
         let mut rank = guess as i32 as usize;
         while self.positions[rank + 1] < position {
             rank += 1;
@@ -68,8 +68,9 @@ pub struct Outline {
     error: f64,
 }
 
-/// An edge between two z coordinates (m); without rows if they are equal.
+/// An edge of a triangle, as x over z.
 struct Edge {
+    /// Minimum and maximum z (m); empty if they are equal.
     range: [f64; 2],
     /// z (m) and x (lines) of its first end.
     from: [f64; 2],
@@ -93,10 +94,10 @@ impl Outline {
             // An edge along x: the row through it meets it where the two other edges end.
             let range = if a[2] == b[2] { [1.0, -1.0] } else { [min(a[2], b[2]), max(a[2], b[2])] };
             let slope = (b[0] - a[0]) * x.inverse / (b[2] - a[2]);
-            Edge { range, from: [a[2], x.lines_to(a[0])], slope }
+            Edge { range, from: [a[2], x.in_lines(a[0])], slope }
         };
         let reach = corners.iter().fold(x.reach, |reach, corner| max(reach, corner[0].abs()));
-        // A position has 11 roundings of at most 2 reach, that of a line 6 of at most 1: 28 in all; the rest of the 128 is margin.
+        // Up to 11 roundings of at most 2 reach for a position and 6 of at most 1 reach for a line: 28 in all. 128 leaves a margin.
         Self { edges: [edge(0), edge(1), edge(2)], error: 128.0 * ROUNDOFF * reach * x.inverse }
     }
 
@@ -112,10 +113,10 @@ impl Outline {
                 let position = if z < edge.range[0] { none } else { position };
                 if z > edge.range[1] { none } else { position }
             };
-            let least = |edge: &Edge| position(edge, f64::INFINITY);
-            let greatest = |edge: &Edge| position(edge, f64::NEG_INFINITY);
-            let start = min(min(least(a), least(b)), least(c)) - self.error;
-            let end = max(max(greatest(a), greatest(b)), greatest(c)) + self.error;
+            let lowest = |edge: &Edge| position(edge, f64::INFINITY);
+            let highest = |edge: &Edge| position(edge, f64::NEG_INFINITY);
+            let start = min(min(lowest(a), lowest(b)), lowest(c)) - self.error;
+            let end = max(max(highest(a), highest(b)), highest(c)) + self.error;
             // Rounding a position plus half a line gives the first line after it; the error margin is larger than the rounding of this sum.
             out.first[lane] = whole(min(max(start + 0.5, first), last));
             out.last[lane] = whole(min(max(end + 0.5, first), last));

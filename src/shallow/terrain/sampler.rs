@@ -10,9 +10,9 @@ use crate::shallow::columns::grid::{BOTTOMLESS, Grid, Heights, TOP};
 /// Positions per batch.
 const BATCH: u64 = 1 << 14;
 /// Maximum number of samples on a line, without its ends.
-const MOST_SAMPLES: f64 = (1 << 24) as f64;
-/// Maximum number of voxels from one end to the other.
-const MOST_STEPS: f64 = 1e15;
+const MAX_SAMPLES: f64 = (1 << 24) as f64;
+/// Maximum length of a line in voxels.
+const MAX_STEPS: f64 = 1e15;
 
 /// The solids of every cell: where distances are negative. Each line is sampled from the minimum height up in steps of a voxel (m), and
 /// sign changes are located by linear interpolation; solids and gaps thinner than a voxel may be missed. What is solid at the minimum
@@ -34,15 +34,15 @@ pub fn solids(
     mut sample: impl FnMut(&[DVec3], &mut Vec<f32>) -> Result<()>,
 ) -> Result<Solids> {
     grid.validate()?;
-    let ladder = Ladder::new(heights, voxel, between)?;
+    let samples = SampleHeights::new(heights, voxel, between)?;
     let mut out = Solids::empty(grid, heights);
     let (mut positions, mut distances) = (Vec::new(), Vec::new());
     let mut line = Line::default();
-    let count = grid.cells() as u64 * ladder.count;
+    let count = grid.cells() as u64 * samples.count;
     let mut next = 0;
     while next < count {
         let end = count.min(next + BATCH);
-        refill(&mut positions, (next..end).map(|index| ladder.position(&grid, index)));
+        refill(&mut positions, (next..end).map(|index| samples.position(&grid, index)));
         sample(&positions, &mut distances)?;
         if distances.len() != positions.len() {
             let (got, wanted) = (distances.len(), positions.len());
@@ -55,8 +55,8 @@ pub fn solids(
                 let [x, y, z] = [position.x, position.y, position.z];
                 return Err(Error::argument(format!("the sampler returned {distance} m at ({x}, {y}, {z})")));
             }
-            line.climb(position.y, f64::from(*distance), &heights);
-            if (index + 1) % ladder.count == 0 {
+            line.add_sample(position.y, f64::from(*distance), &heights);
+            if (index + 1) % samples.count == 0 {
                 line.finish();
                 out.push(&line.solids);
                 line.solids.clear();
@@ -68,26 +68,27 @@ pub fn solids(
 }
 
 /// The heights at which each line is sampled.
-struct Ladder {
+struct SampleHeights {
     low: f64,
     high: f64,
     voxel: f64,
-    /// The first sample after the one at the minimum height, in voxels; count of samples with both ends.
+    /// Height of the second sample above the first one (voxels).
     first: u64,
+    /// Count of samples, including both ends.
     count: u64,
 }
 
-impl Ladder {
+impl SampleHeights {
     fn new(heights: Heights, voxel: f64, between: [f64; 2]) -> Result<Self> {
         let (low, high) = (heights.low, heights.metres(TOP));
         if !(voxel > 0.0 && voxel.is_finite()) {
             return Err(Error::argument(format!("a voxel of {voxel} m is not a positive length")));
         }
         let steps = ((high - low) / voxel).ceil();
-        // The samples around those heights; none where they do not overlap the range.
+        // The samples around `between`; none if it does not overlap the range of heights.
         let first = ((between[0] - low) / voxel).floor().clamp(1.0, steps.max(1.0));
         let end = (((between[1] - low) / voxel).ceil() + 1.0).clamp(first, steps.max(1.0));
-        if steps < 1.0 || end - first >= MOST_SAMPLES || steps >= MOST_STEPS {
+        if steps < 1.0 || end - first >= MAX_SAMPLES || steps >= MAX_STEPS {
             return Err(Error::argument(format!(
                 "a voxel of {voxel} m is too small for heights from {low} to {high} m"
             )));
@@ -95,7 +96,7 @@ impl Ladder {
         Ok(Self { low, high, voxel, first: first as u64, count: (end - first) as u64 + 2 })
     }
 
-    /// Position of a sample, numbered along one line after another.
+    /// Position of a sample; samples are numbered upward, line by line.
     fn position(&self, grid: &Grid, index: u64) -> DVec3 {
         let (cell, step) = ((index / self.count) as usize, index % self.count);
         let [x, z] = grid.centre([cell % grid.size[0], cell / grid.size[0]]);
@@ -119,7 +120,7 @@ struct Line {
 }
 
 impl Line {
-    fn climb(&mut self, height: f64, distance: f64, heights: &Heights) {
+    fn add_sample(&mut self, height: f64, distance: f64, heights: &Heights) {
         let is_solid = distance < 0.0;
         match self.below {
             None => self.bottom = is_solid.then_some(BOTTOMLESS),
@@ -127,7 +128,7 @@ impl Line {
                 let part = before / (before - distance);
                 let border = heights.round(from + part * (height - from));
                 match self.bottom.take() {
-                    Some(bottom) => self.add([bottom, border]),
+                    Some(bottom) => self.add_solid([bottom, border]),
                     None => self.bottom = Some(border),
                 }
             }
@@ -137,16 +138,16 @@ impl Line {
     }
 
     /// Adds a solid that is at least one unit high.
-    fn add(&mut self, solid: Solid) {
+    fn add_solid(&mut self, solid: Solid) {
         if solid[0] < solid[1] {
             self.solids.push(solid);
         }
     }
 
-    /// Ends the line at the maximum height; the next may begin once its solids are taken.
+    /// Ends the line at the maximum height; before the next one begins, the caller takes its solids.
     fn finish(&mut self) {
         if let Some(bottom) = self.bottom.take() {
-            self.add([bottom, TOP]);
+            self.add_solid([bottom, TOP]);
         }
         self.below = None;
         unite(&mut self.solids);

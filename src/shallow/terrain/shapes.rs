@@ -122,13 +122,13 @@ impl Shape {
         (bottom < top).then_some([bottom, top])
     }
 
-    /// Calls `see` with each cell (x, z) that has a solid of it, row by row along x.
-    pub fn each(&self, grid: &Grid, heights: &Heights, mut see: impl FnMut([usize; 2], Solid)) {
+    /// Calls `visit` with each cell (x, z) that has a solid of it, row by row along x.
+    pub fn each_cell(&self, grid: &Grid, heights: &Heights, mut visit: impl FnMut([usize; 2], Solid)) {
         let [columns, rows] = self.cells(grid);
         for z in rows {
             for x in columns.clone() {
                 if let Some(solid) = self.solid(grid.centre([x, z]), heights) {
-                    see([x, z], solid);
+                    visit([x, z], solid);
                 }
             }
         }
@@ -140,28 +140,28 @@ fn root(square: f64) -> Option<f64> {
     (square >= 0.0).then(|| square.sqrt())
 }
 
-/// A capsule is what a sphere sweeps from one end to the other; the highest and the lowest position on the line each lie on one of those
-/// spheres.
+/// A sphere that moves from one end to the other sweeps the capsule. The top and the bottom of the line's part in it each lie on one of the
+/// sphere's positions.
 fn of_capsule([from, to]: &[DVec3; 2], radius: f64, at: [f64; 2]) -> Option<[f64; 2]> {
-    let way = to - from;
+    let segment = to - from;
     let [x, z] = [at[0] - from.x, at[1] - from.z];
-    let square = way.x * way.x + way.z * way.z;
+    let square = segment.x * segment.x + segment.z * segment.z;
     if square == 0.0 {
         let half = root(radius * radius - (x * x + z * z))?;
         return Some([from.y.min(to.y) - half, from.y.max(to.y) + half]);
     }
     let length = square.sqrt();
-    // The line as seen from above: how far along the segment, and how far beside it.
-    let along = (x * way.x + z * way.z) / length;
-    let beside = (x * way.z - z * way.x) / length;
+    // Seen from above: the line's distance along the segment, and from it.
+    let along = (x * segment.x + z * segment.z) / length;
+    let beside = (x * segment.z - z * segment.x) / length;
     let room = radius * radius - beside * beside;
-    let slant = way.y / (square + way.y * way.y).sqrt();
+    let slant = segment.y / (square + segment.y * segment.y).sqrt();
     let reach = root(room)? * slant;
-    // Upward +1, downward -1.
+    // The top (+1) and the bottom (-1).
     let end = |side: f64| {
         let part = ((along + side * reach) / length).clamp(0.0, 1.0);
         let off = part * length - along;
-        Some(from.y + part * way.y + side * root(room - off * off)?)
+        Some(from.y + part * segment.y + side * root(room - off * off)?)
     };
     Some([end(-1.0)?, end(1.0)?])
 }
@@ -265,7 +265,7 @@ mod tests {
     fn each_cell_of_a_shape_is_seen_once_in_units() {
         for shape in shapes() {
             let mut seen = Vec::new();
-            shape.each(&GRID, &heights(), |cell, solid| seen.push((GRID.index(cell), solid)));
+            shape.each_cell(&GRID, &heights(), |cell, solid| seen.push((GRID.index(cell), solid)));
             assert!(seen.is_sorted_by(|a, b| a.0 < b.0), "{shape:?}");
             for (index, [bottom, top]) in seen {
                 let at = GRID.centre([index % 40, index / 40]);
@@ -274,7 +274,7 @@ mod tests {
             }
         }
         let above = Shape::Sphere { centre: DVec3::new(0.0, 9.0, 0.0), radius: 1.0 };
-        above.each(&GRID, &heights(), |cell, _| panic!("{cell:?} is below it"));
+        above.each_cell(&GRID, &heights(), |cell, _| panic!("{cell:?} is below it"));
         let beside = Shape::Sphere { centre: DVec3::new(9.0, 0.0, -7.0), radius: 1.0 };
         assert_eq!(beside.cells(&GRID).map(|range| range.len()), [0, 0]);
     }

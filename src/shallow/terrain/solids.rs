@@ -8,9 +8,9 @@ pub type Solid = [i32; 2];
 /// The solid intervals of every cell, from the lowest up; they neither touch nor overlap.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solids {
-    /// Cells.
+    /// The cells.
     pub grid: Grid,
-    /// Heights.
+    /// Range and unit of heights.
     pub heights: Heights,
     /// Where each cell's intervals begin, row by row, and the end of the last.
     starts: Vec<u32>,

@@ -12,9 +12,9 @@
 //! gives the same solids unless a line meets the silhouette of a solid exactly; the line then belongs to the other side.
 
 use super::Solids;
+use super::cell_crossings::{CellCrossings, reserve_half_more};
 use super::crossings::{Crossed, Facet};
 use super::lines::{LANES, Lines, Outline, Spans};
-use super::piles::{Piles, keep_room};
 use super::solids::Solid;
 use crate::error::{Error, Result};
 use crate::geometry::Vec3;
@@ -23,9 +23,9 @@ use crate::numeric::cpu::{FlushDenormals, dispatch};
 use crate::numeric::lists::refill;
 use crate::shallow::columns::grid::{Cells, Grid, Heights, check_cells};
 
-/// Up to this many lines are tested against a triangle without looking at its edges.
+/// Up to this many lines are tested against a triangle without limiting the rows to its edges.
 const FEW: u32 = 3;
-/// Lines of a triangle that are collected before they are tested.
+/// Count of lines that are collected before they are tested against a triangle.
 const ROOM: usize = 64;
 
 /// The solids of every cell. Triangles are counter-clockwise seen from outside.
@@ -39,8 +39,8 @@ pub fn solids(positions: &[Vec3], triangles: &[[u32; 3]], grid: Grid, heights: H
     Ok(Solids::of_cells(grid, heights, |cell| caster.at(cell)))
 }
 
-/// Casts the lines through a box of cells again and again. Buffers keep capacity for half as many crossings again: it allocates only for a
-/// larger box, more vertices or many more crossings than before.
+/// Casts the lines through a box of cells, and is reused from frame to frame. Buffers have room for half as many crossings again: a cast
+/// allocates only for a larger box, more vertices or many more crossings than before.
 pub struct Caster {
     heights: Heights,
     size: [usize; 2],
@@ -48,9 +48,9 @@ pub struct Caster {
     lines: [Lines; 2],
     /// The cells of the last cast, along x and z.
     cells: Cells,
-    /// For each vertex, the counts of lines left of it.
+    /// For each vertex, its rank ([`Lines::rank`]) along x and z, clamped to the box.
     ranks: Vec<[u32; 2]>,
-    piles: Piles,
+    crossings: CellCrossings,
     starts: Vec<u32>,
     solids: Vec<Solid>,
 }
@@ -94,7 +94,7 @@ impl Caster {
             lines: [0, 1].map(lines),
             cells: [0..0, 0..0],
             ranks: Vec::new(),
-            piles: Piles::default(),
+            crossings: CellCrossings::default(),
             starts: Vec::new(),
             solids: Vec::new(),
         })
@@ -111,10 +111,10 @@ impl Caster {
         ensure(!triangles.is_empty(), "the terrain has no triangles")?;
         self.rank(positions, &cells)?;
         self.cross(positions, triangles, &cells)?;
-        self.piles.stack(&mut self.starts, &mut self.solids);
+        self.crossings.find_solids(&mut self.starts, &mut self.solids);
         self.cells = cells;
-        self.piles.keep_room();
-        keep_room(&mut self.solids);
+        self.crossings.reserve_half_more();
+        reserve_half_more(&mut self.solids);
         Ok(())
     }
 
@@ -123,7 +123,7 @@ impl Caster {
         self.starts.clear();
         self.solids.clear();
         check_cells(cells, self.size)?;
-        self.piles.reset(cells[0].len() * cells[1].len());
+        self.crossings.reset(cells[0].len() * cells[1].len());
         Ok(())
     }
 
@@ -150,9 +150,9 @@ impl Caster {
     /// Lists the crossings of each cell.
     fn cross(&mut self, positions: &[Vec3], triangles: &[[u32; 3]], cells: &Cells) -> Result<()> {
         let ([x, z], lines, heights) = (cells, &self.lines, self.heights);
-        let (ranks, piles) = (&self.ranks[..], &mut self.piles);
+        let (ranks, crossings) = (&self.ranks[..], &mut self.crossings);
         let first = [x.start as u32, z.start as u32];
-        let mut work = Work { positions, ranks, lines, heights, width: x.len() as u32, first, piles };
+        let mut work = Work { positions, ranks, lines, heights, width: x.len() as u32, first, crossings };
         let work = &mut work;
         dispatch!(at most avx2: cross_triangles(work: &mut Work<'_>, triangles: &[[u32; 3]]) -> Result<()>)
     }
@@ -185,21 +185,22 @@ impl Caster {
     }
 }
 
-/// Input of a search for crossings, and its output.
+/// Input and output of a search for crossings.
 struct Work<'a> {
     positions: &'a [Vec3],
     ranks: &'a [[u32; 2]],
     lines: &'a [Lines; 2],
     heights: Heights,
-    /// Cells of the box along x, and its first cell.
+    /// Count of the box's cells along x.
     width: u32,
+    /// First cell of the box.
     first: [u32; 2],
-    piles: &'a mut Piles,
+    crossings: &'a mut CellCrossings,
 }
 
 #[inline(always)]
 fn cross_triangles(work: &mut Work<'_>, triangles: &[[u32; 3]]) -> Result<()> {
-    let mut near = Near::default();
+    let mut candidates = Candidates::default();
     for (index, triangle) in triangles.iter().enumerate() {
         let rank = |corner: usize| work.ranks.get(triangle[corner] as usize);
         let (Some(&a), Some(&b), Some(&c)) = (rank(0), rank(1), rank(2)) else {
@@ -215,8 +216,8 @@ fn cross_triangles(work: &mut Work<'_>, triangles: &[[u32; 3]]) -> Result<()> {
         if columns[0] == columns[1] || rows[0] == rows[1] {
             continue;
         }
-        work.cross(triangle, columns, rows, &mut near);
-        if work.piles.len() >= u32::MAX as usize {
+        work.cross(triangle, columns, rows, &mut candidates);
+        if work.crossings.len() >= u32::MAX as usize {
             return Err(Error::argument("the terrain has over 4,294,967,294 crossings with lines of cells"));
         }
     }
@@ -226,39 +227,40 @@ fn cross_triangles(work: &mut Work<'_>, triangles: &[[u32; 3]]) -> Result<()> {
 impl Work<'_> {
     /// Adds the crossings of a triangle within ranges of lines.
     #[inline(always)]
-    fn cross(&mut self, triangle: &[u32; 3], columns: [u32; 2], rows: [u32; 2], near: &mut Near) {
+    fn cross(&mut self, triangle: &[u32; 3], columns: [u32; 2], rows: [u32; 2], candidates: &mut Candidates) {
         let [along_x, along_z] = self.lines;
         let corner = |corner: usize| {
             let p = &self.positions[triangle[corner] as usize];
             [p.x, p.y, p.z].map(f64::from)
         };
         let facet = Facet::new([corner(0), corner(1), corner(2)], self.heights.unit);
-        // A few lines are all tested; of many, only those of each row that lie between edges.
+        // Few lines are all tested; of many, only those of each row between the triangle's edges.
         let [width, depth] = [columns, rows].map(|[first, last]| last - first);
         let first = (rows[0] - self.first[1]) * self.width + (columns[0] - self.first[0]);
         if width == 1 && depth == 1 {
             if let Some((height, is_up)) = facet.cross([along_x.at(columns[0]), along_z.at(rows[0])]) {
-                self.piles.add(first as usize, (self.heights.round(height) as u32) << 1 | u32::from(is_up));
+                self.crossings
+                    .add(first as usize, (self.heights.round(height) as u32) << 1 | u32::from(is_up));
             }
             return;
         }
         let is_wide = width > 1 && width.saturating_mul(depth) > FEW;
         let outline = is_wide.then(|| Outline::new(&facet.corners, along_x));
-        for some in (rows[0]..rows[1]).step_by(LANES) {
-            let z = along_z.from(some);
+        for first_row in (rows[0]..rows[1]).step_by(LANES) {
+            let z = along_z.from(first_row);
             if let Some(outline) = &outline {
-                outline.spans(z, columns, &mut near.spans);
+                outline.spans(z, columns, &mut candidates.spans);
             }
-            for (position, row) in (some..rows[1]).take(LANES).enumerate() {
-                let [start, end] = if is_wide { near.spans.lines(position) } else { columns };
+            for (position, row) in (first_row..rows[1]).take(LANES).enumerate() {
+                let [start, end] = if is_wide { candidates.spans.lines(position) } else { columns };
                 let first = (row - self.first[1]) * self.width + (start - self.first[0]);
                 let mut column = start;
                 loop {
-                    if near.count > ROOM - LANES {
-                        self.add_all(&facet, near);
+                    if candidates.count > ROOM - LANES {
+                        self.add_all(&facet, candidates);
                     }
                     let count = end.saturating_sub(column);
-                    near.add(along_x.from(column), z[position], first + (column - start), count);
+                    candidates.add(along_x.from(column), z[position], first + (column - start), count);
                     if count <= LANES as u32 {
                         break;
                     }
@@ -266,20 +268,21 @@ impl Work<'_> {
                 }
             }
         }
-        self.add_all(&facet, near);
+        self.add_all(&facet, candidates);
     }
 
-    /// Adds the crossings of a triangle with lines near it.
+    /// Adds the crossings of a triangle with the candidates, and clears these.
     #[inline(always)]
-    fn add_all(&mut self, facet: &Facet, near: &mut Near) {
-        let Near { x, z, cells, count, crossed, .. } = near;
+    fn add_all(&mut self, facet: &Facet, candidates: &mut Candidates) {
+        let Candidates { x, z, cells, count, crossed, .. } = candidates;
         let lanes = x.as_chunks::<LANES>().0.iter().zip(z.as_chunks::<LANES>().0);
         for ((x, z), cells) in lanes.zip(cells[..*count].chunks(LANES)) {
             facet.cross_all(x, z, &self.heights, crossed);
             for (lane, &cell) in cells.iter().enumerate() {
-                if let Some((height, is_up)) = facet.one_of(lane, crossed, [x[lane], z[lane]], &self.heights)
+                if let Some((height, is_up)) =
+                    facet.crossing_of(lane, crossed, [x[lane], z[lane]], &self.heights)
                 {
-                    self.piles.add(cell as usize, height << 1 | u32::from(is_up));
+                    self.crossings.add(cell as usize, height << 1 | u32::from(is_up));
                 }
             }
         }
@@ -288,7 +291,7 @@ impl Work<'_> {
 }
 
 /// Lines that may cross a triangle.
-struct Near {
+struct Candidates {
     x: [f64; ROOM],
     z: [f64; ROOM],
     cells: [u32; ROOM],
@@ -297,19 +300,19 @@ struct Near {
     crossed: Crossed,
 }
 
-impl Default for Near {
+impl Default for Candidates {
     fn default() -> Self {
         let (spans, crossed) = (Spans::default(), Crossed::default());
         Self { x: [0.0; ROOM], z: [0.0; ROOM], cells: [0; ROOM], count: 0, spans, crossed }
     }
 }
 
-impl Near {
-    /// Adds the first of `count` lines side by side, at most [`LANES`].
+impl Candidates {
+    /// Adds lines side by side: the first `count` ones, at most [`LANES`].
     #[inline(always)]
     fn add(&mut self, x: &[f64; LANES], z: f64, cell: u32, count: u32) {
         let position = self.count.min(ROOM - LANES);
-        // The next ones overwrite the surplus.
+        // All lanes are written; the next call overwrites those beyond `count`.
         self.x[position..][..LANES].copy_from_slice(x);
         self.z[position..][..LANES].fill(z);
         for (lane, out) in (0..).zip(&mut self.cells[position..][..LANES]) {
@@ -422,9 +425,9 @@ mod tests {
         let mut caster = Caster::new(GRID, heights()).unwrap();
         caster.cast(&positions, &triangles, [0..8, 0..8]).unwrap();
         let memory = |caster: &Caster| {
-            let Caster { ranks, piles, starts, solids, .. } = caster;
+            let Caster { ranks, crossings, starts, solids, .. } = caster;
             let sizes = [ranks.capacity(), starts.capacity(), solids.capacity()];
-            (sizes, ranks.as_ptr(), piles.memory(), starts.as_ptr(), solids.as_ptr())
+            (sizes, ranks.as_ptr(), crossings.memory(), starts.as_ptr(), solids.as_ptr())
         };
         let first = memory(&caster);
         for frame in 0..20u8 {

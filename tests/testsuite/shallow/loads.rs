@@ -30,7 +30,7 @@ fn load(liquid: &Shallow, velocity: [f64; 3]) -> Load {
 fn volume(liquid: &Shallow, body: &Shape, level: f64) -> f64 {
     let (grid, heights) = (liquid.columns().grid, liquid.columns().heights);
     let mut units = 0_i64;
-    body.each(&grid, &heights, |_, [bottom, top]| {
+    body.each_cell(&grid, &heights, |_, [bottom, top]| {
         units += i64::from(top.min(heights.round(level)) - bottom).max(0);
     });
     units as f64 * heights.unit * grid.cell * grid.cell
@@ -108,7 +108,7 @@ fn a_body_that_moves_is_held_back_by_jet_and_shear() {
     // The plate's cells: two across, ten along; one of its faces is run into, two ends are sheared, and so is neither top nor bottom.
     let depth = liquid.view().at([0.03, 0.0, 0.0]).unwrap().depth;
     let mut cells = 0;
-    plate.each(&liquid.columns().grid, &liquid.columns().heights, |_, _| cells += 1);
+    plate.each_cell(&liquid.columns().grid, &liquid.columns().heights, |_, _| cells += 1);
     let (across, along) = (2, cells / 2);
     let front = 0.5 * DENSITY * 0.3 * 0.3 * along as f64 * CELL * depth;
     let sides = DENSITY * nu * (0.3 / (0.5 * CELL)) * 2.0 * across as f64 * CELL * depth;

@@ -97,7 +97,7 @@ fn a_sphere_is_the_same_from_triangles_distances_and_its_formula() {
     let sampled = sampled.unwrap();
     let mut cells = vec![Vec::new(); grid.cells()];
     let sphere = Shape::Sphere { centre: DVec3::zeros(), radius: 0.5 };
-    sphere.each(&grid, &heights, |cell, solid| cells[grid.index(cell)].push(solid));
+    sphere.each_cell(&grid, &heights, |cell, solid| cells[grid.index(cell)].push(solid));
     let exact = Solids::new(grid, heights, cells);
     // At the rim lines are almost tangents.
     let (worst, others) = difference(&cast, &exact);

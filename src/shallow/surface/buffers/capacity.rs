@@ -4,7 +4,7 @@ use crate::numeric::lists::refill;
 use crate::shallow::columns::grid::BOTTOMLESS;
 use crate::shallow::columns::{Columns, STRIP};
 use crate::shallow::surface::Counts;
-use crate::shallow::surface::quartets::links::{RING, Scene};
+use crate::shallow::surface::quartets::links::{LiquidColumns, RING};
 use crate::shallow::surface::quartets::strips::positions;
 
 /// The maximum counts that the surface of any liquid in these columns can have, so that a host sizes its buffers once. Liquids that fill up
@@ -34,9 +34,9 @@ pub fn bound(columns: &Columns) -> Counts {
         }
         if row > 0 {
             for x in 1..nx {
-                // The quartet's other cells are to the south-east of its first cell, and so on.
+                // The bit of the quartet in `Room::walls`: it is to the south-east of its first cell, and so on.
                 let cells = [(&rows[0][x - 1], 3), (&rows[0][x], 2), (&rows[1][x - 1], 0), (&rows[1][x], 1)];
-                triangles += quartet.most_triangles(cells);
+                triangles += quartet.max_triangles(cells);
             }
         }
     }
@@ -49,7 +49,7 @@ struct Room {
     under: i32,
     base: i32,
     ceiling: i32,
-    /// For the quartets to the north-east, north-west, south-west and south-east: a bit for each in which its surface may end at a wall.
+    /// A bit for each of the quartets to the north-east, north-west, south-west and south-east in which its surface may end at a wall.
     walls: u8,
 }
 
@@ -65,14 +65,15 @@ impl Room {
 /// The columns of a quartet.
 #[derive(Debug, Default)]
 struct Quartet {
-    /// Each with its corner and its set: columns joined by a chain of possible links.
+    /// Each with its corner and its set; a set is joined by chains of possible links.
     rooms: Vec<(Room, usize, usize)>,
-    changes: Vec<i32>,
+    /// Distinct undersides of a set: scratch.
+    undersides: Vec<i32>,
 }
 
 impl Quartet {
-    /// Maximum number of triangles, from the columns of each corner and which of their quartets it is. Columns that can neither be linked
-    /// with each other nor both with others share no triangle: the maxima of these sets are summed.
+    /// Maximum number of triangles, from the columns at each corner and the bit of this quartet in their `walls`. Columns of different sets
+    /// share no triangle: the maxima of the sets are summed.
     ///
     /// A set with at most one column at each corner has at most two triangles, or one if it has three corners: where all links exist, the
     /// columns are a group of four, else two of its groups of three lack one. If its surface may end at walls, and each of its columns may
@@ -86,8 +87,8 @@ impl Quartet {
     /// they are dry, which at most three groups can share: one triangle per column. Groups without a common wet column are at different
     /// heights with an underside between them: two triangles for each, and two more. A column with walls may be in two more, and its
     /// neighbours' walls add four more in the sets of random scenes that need most (not proved: a test tries many).
-    fn most_triangles(&mut self, cells: [(&Vec<Room>, u8); 4]) -> usize {
-        let Self { rooms, changes } = self;
+    fn max_triangles(&mut self, cells: [(&Vec<Room>, u8); 4]) -> usize {
+        let Self { rooms, undersides } = self;
         rooms.clear();
         for (corner, (cell, side)) in cells.into_iter().enumerate() {
             let here = |room: &Room| Room { walls: room.walls >> side & 1, ..*room };
@@ -104,7 +105,7 @@ impl Quartet {
                 }
             }
         }
-        let mut most = 0;
+        let mut max = 0;
         for set in 0..rooms.len() {
             let of_set = || rooms.iter().filter(|room| room.2 == set);
             let count = of_set().count();
@@ -118,18 +119,21 @@ impl Quartet {
                     of_set().all(|(other, of, _)| of == corner || own.may_link(other))
                 })
             };
-            most += if count > corners || (walls > 0 && !all_link()) {
-                refill(changes, of_set().map(|(room, ..)| room.under).filter(|under| *under != BOTTOMLESS));
-                changes.sort_unstable();
-                changes.dedup();
-                count.min(2 + 2 * changes.len()) + 6 * walls
+            max += if count > corners || (walls > 0 && !all_link()) {
+                refill(
+                    undersides,
+                    of_set().map(|(room, ..)| room.under).filter(|under| *under != BOTTOMLESS),
+                );
+                undersides.sort_unstable();
+                undersides.dedup();
+                count.min(2 + 2 * undersides.len()) + 6 * walls
             } else if walls > 0 {
                 count + 1
             } else {
                 count.saturating_sub(2)
             };
         }
-        most
+        max
     }
 }
 
@@ -138,20 +142,20 @@ impl Quartet {
 pub(in crate::shallow::surface) struct Walls {
     /// Pairs of a column and an adjacent one whose solid reaches from below the first one's ceiling up to it, or higher.
     pub pairs: usize,
-    /// For each index, the quartets to the north-east, north-west, south-west and south-east in which it has such a wall: a bit each.
+    /// For each index, a bit for each of the quartets to the north-east, north-west, south-west and south-east in which it has such a wall.
     sides: Vec<u8>,
 }
 
 impl Walls {
     pub fn of(columns: &Columns) -> Self {
-        let scene = Scene { columns, depth: &[], above: &[] };
+        let liquid = LiquidColumns { columns, depth: &[], above: &[] };
         let mut out = Self { pairs: 0, sides: vec![0; columns.len()] };
         for strip in 0..columns.strips().len() {
             for position in positions(columns.present(strip)) {
                 let index = strip * STRIP + position;
                 let ceiling = columns.ceilings()[index];
                 let is_wall = RING.map(|step| {
-                    scene
+                    liquid
                         .beside(index, step, ceiling - 1)
                         .is_some_and(|other| ceiling <= columns.bases()[other])
                 });
@@ -176,7 +180,7 @@ mod tests {
     #[test]
     fn quartets_have_room_for_their_groups() {
         // Rooms of 3 units above undersides.
-        let most = |cells: [&[i32]; 4]| {
+        let max = |cells: [&[i32]; 4]| {
             let cells = cells.map(|cell| {
                 let bases = cell.iter().map(|under| if *under == BOTTOMLESS { 0 } else { under + 1 });
                 let bases: Vec<i32> = bases.collect();
@@ -189,14 +193,14 @@ mod tests {
                 bases.iter().enumerate().map(room).collect::<Vec<_>>()
             });
             let [a, b, c, d] = &cells;
-            Quartet::default().most_triangles([(a, 0), (b, 0), (c, 0), (d, 0)])
+            Quartet::default().max_triangles([(a, 0), (b, 0), (c, 0), (d, 0)])
         };
         let ground: &[i32] = &[BOTTOMLESS];
-        assert_eq!(most([ground, ground, ground, ground]), 2);
-        assert_eq!(most([ground, ground, &[], &[5]]), 1);
-        assert_eq!(most([ground, ground, &[], &[]]), 0);
+        assert_eq!(max([ground, ground, ground, ground]), 2);
+        assert_eq!(max([ground, ground, &[], &[5]]), 1);
+        assert_eq!(max([ground, ground, &[], &[]]), 0);
         // Two floors at one height everywhere, and at different heights.
-        assert_eq!(most([&[BOTTOMLESS, 7]; 4]), 4);
-        assert_eq!(most([&[BOTTOMLESS, 7], &[BOTTOMLESS, 7], &[BOTTOMLESS, 8], ground]), 6);
+        assert_eq!(max([&[BOTTOMLESS, 7]; 4]), 4);
+        assert_eq!(max([&[BOTTOMLESS, 7], &[BOTTOMLESS, 7], &[BOTTOMLESS, 8], ground]), 6);
     }
 }

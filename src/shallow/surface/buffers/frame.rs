@@ -12,13 +12,17 @@ pub(in crate::shallow) struct Frame {
     z_up: bool,
     /// Sign of z.
     pub sign: f32,
-    /// Height of 0, and of a unit; centre of cell (0, 0), and edge of a cell (m x scale).
+    /// Height of 0 units (m x scale).
     low: f32,
+    /// Length of a unit (m x scale).
     pub unit: f32,
+    /// Centre of cell (0, 0) (m x scale).
     origin: [f32; 2],
+    /// Edge of a cell (m x scale).
     pub cell: f32,
-    /// Speed at the surface (m/s x scale) per mean speed (m/s); opacity of one unit.
+    /// Speed at the surface (m/s x scale) per mean speed (m/s).
     pub speed: f32,
+    /// Opacity of a depth of one unit.
     pub opacity: f32,
 }
 

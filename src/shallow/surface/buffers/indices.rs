@@ -5,9 +5,9 @@ use std::ops::Range;
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::STRIP;
 use crate::shallow::surface::Indices;
-use crate::shallow::surface::quartets::links::Scene;
+use crate::shallow::surface::quartets::links::LiquidColumns;
 use crate::shallow::surface::quartets::odd::{Search, each_odd_triangle};
-use crate::shallow::surface::quartets::strips::{Found, some};
+use crate::shallow::surface::quartets::strips::{Found, neighbour};
 use crate::shallow::surface::rim::boundary::Wall;
 
 /// Index count of a pair of triangles.
@@ -32,8 +32,9 @@ impl Index for u32 {
     }
 }
 
-/// The triangles of 16 quartets side by side. The vertices in the north are a + position, those in the south c + position: each index is
-/// a + `add`, plus c - a where `south` has all bits set; the opposite where `turned` has the bit of a turned quartet.
+/// The triangles of 16 quartets side by side. Their vertices are a + position in the north and c + position in the south. An index is
+/// a + `add` in the north; in the south, where `south` has all bits set, it is c + `add`. Where `turned` has the bit of a quartet that is
+/// divided from north-east to south-west, north and south are swapped.
 struct Pattern {
     add: [u32; PAIR * STRIP],
     south: [u32; PAIR * STRIP],
@@ -62,7 +63,7 @@ impl Pattern {
         out
     }
 
-    /// Writes a part of the indices.
+    /// Writes the `part` of the indices.
     #[inline(always)]
     fn put<I: Index>(&self, a: u32, c: u32, turned: u32, part: Range<usize>, out: &mut [I]) {
         let down = c.wrapping_sub(a);
@@ -76,7 +77,7 @@ impl Pattern {
 
 /// Writes all triangles except those of skirts; `flipped`: clockwise seen from above. Returns the index count.
 pub(in crate::shallow::surface) fn write_triangles(
-    scene: Scene<'_>,
+    liquid: LiquidColumns<'_>,
     found: &Found,
     walls: &[Wall],
     search: &Search,
@@ -87,11 +88,11 @@ pub(in crate::shallow::surface) fn write_triangles(
         Indices::None => 0,
         Indices::U16(out) => {
             let done = dispatch!(write_full::<u16>(found: &Found, flipped: bool, out: &mut [u16]) -> usize);
-            done + write_odd(scene, found, walls, search, flipped, &mut out[done..])
+            done + write_odd(liquid, found, walls, search, flipped, &mut out[done..])
         }
         Indices::U32(out) => {
             let done = dispatch!(write_full::<u32>(found: &Found, flipped: bool, out: &mut [u32]) -> usize);
-            done + write_odd(scene, found, walls, search, flipped, &mut out[done..])
+            done + write_odd(liquid, found, walls, search, flipped, &mut out[done..])
         }
     }
 }
@@ -102,7 +103,7 @@ fn write_full<I: Index>(found: &Found, flipped: bool, out: &mut [I]) -> usize {
     let pattern = &PATTERNS[usize::from(flipped)];
     let mut at = 0;
     for span in &found.spans {
-        let Some(south) = some(span.south) else { continue };
+        let Some(south) = neighbour(span.south) else { continue };
         for step in 0..span.len {
             let (strip, south) = (span.first + step, south + step);
             let (full, turned) = (found.states[strip].full, u32::from(found.states[strip].turned));
@@ -141,7 +142,7 @@ fn runs(positions: u16) -> impl Iterator<Item = Range<usize>> {
 
 /// Writes the triangles of odd quartets and returns the index count.
 fn write_odd<I: Index>(
-    scene: Scene<'_>,
+    liquid: LiquidColumns<'_>,
     found: &Found,
     walls: &[Wall],
     search: &Search,
@@ -150,7 +151,7 @@ fn write_odd<I: Index>(
 ) -> usize {
     let mut count = 0;
     let mut out = out.as_chunks_mut::<3>().0.iter_mut();
-    let vertex = |id: u32| match (id as usize).checked_sub(scene.columns.len()) {
+    let vertex = |id: u32| match (id as usize).checked_sub(liquid.columns.len()) {
         Some(extra) => walls[extra].vertex,
         None => found.vertex(id as usize / STRIP, id as usize % STRIP),
     };

@@ -3,27 +3,27 @@
 
 use crate::numeric::lists::reset;
 use crate::shallow::columns::{Columns, STRIP};
-use crate::shallow::surface::quartets::links::Scene;
+use crate::shallow::surface::quartets::links::LiquidColumns;
 use crate::shallow::surface::quartets::strips::Found;
 
-/// The heights as shown, and the factor that turns their differences into slopes.
+/// The heights at which columns are shown, and the factor from their differences to slopes.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::shallow::surface) struct Shown<'a> {
-    pub scene: Scene<'a>,
+    pub liquid: LiquidColumns<'a>,
     /// Height of each index (units).
     pub heights: &'a [i32],
-    /// One unit divided by two cells.
+    /// Slope of one unit over two cells.
     pub slope: f32,
 }
 
 impl Shown<'_> {
     /// Normal of a wet column: x to the east, y up, z to the south.
     pub fn normal(&self, found: &Found, index: usize) -> [f32; 3] {
-        let (columns, scene) = (self.scene.columns, self.scene);
+        let (columns, liquid) = (self.liquid.columns, self.liquid);
         let (strip, position) = (index / STRIP, index % STRIP);
         let state = &found.states[strip];
         let [west, east, north, south] = if state.rough >> position & 1 == 1 {
-            let beside = |step| scene.wet_beside(index, step);
+            let beside = |step| liquid.wet_beside(index, step);
             [beside([-1, 0]), beside([1, 0]), beside([0, -1]), beside([0, 1])]
         } else {
             // Full quartets link it with columns of its own layer.
@@ -53,7 +53,7 @@ pub(in crate::shallow) fn upright(x: f32, z: f32) -> [f32; 3] {
     [x * y, y, z * y]
 }
 
-/// Normals that dry vertices need as well, each computed once.
+/// Normals of wet columns, each computed once although the means of several vertices include it.
 #[derive(Debug, Default)]
 pub(in crate::shallow::surface) struct Normals {
     /// By index.

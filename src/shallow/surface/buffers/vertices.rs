@@ -7,13 +7,13 @@ use super::normals::{Normals, Shown, upright};
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{NONE, STRIP, strip_of};
 use crate::shallow::scalars::MAX_SCALARS;
-use crate::shallow::surface::quartets::links::Scene;
+use crate::shallow::surface::quartets::links::LiquidColumns;
 use crate::shallow::surface::quartets::strips::{Found, Span};
-use crate::shallow::surface::rim::boundary::{Around, Wall, walls_of};
-use crate::shallow::surface::rim::hem::Hem;
+use crate::shallow::surface::rim::boundary::{Stencil, Wall, walls_of};
+use crate::shallow::surface::rim::skirt_vertex::SkirtVertex;
 use crate::shallow::surface::{Depths, Layout, Target};
 
-/// A run starts within a strip if at least `LONG` columns at its end belong to it; up to `SHORT` adjacent columns are written one by one.
+/// A run starts within a strip if it has at least `LONG` columns there. Up to `SHORT` adjacent columns are written one by one.
 const LONG: u32 = 8;
 const SHORT: u32 = 2;
 
@@ -26,12 +26,13 @@ pub(in crate::shallow::surface) struct Vertices<'a> {
     carried: [&'a [f32]; MAX_SCALARS],
     wants_normals: bool,
     frame: Frame,
-    /// The caller's units per metre, and how far hems are below the ground (units).
+    /// The caller's units per metre.
     scale: f32,
-    least: i32,
+    /// How far skirt vertices are below the ground (units).
+    skirt_sink: i32,
 }
 
-/// Wet columns in a row of a span that full quartets link with wet ones on all sides.
+/// Consecutive wet columns of a span, each linked by full quartets with wet ones on all sides.
 #[derive(Clone, Copy)]
 struct Run {
     /// First index.
@@ -42,7 +43,7 @@ struct Run {
 
 impl<'a> Vertices<'a> {
     pub fn new(
-        scene: Scene<'a>,
+        liquid: LiquidColumns<'a>,
         found: &'a Found,
         walls: &'a [Wall],
         shown: &'a [i32],
@@ -50,45 +51,45 @@ impl<'a> Vertices<'a> {
         layout: &Layout,
         wants_normals: bool,
     ) -> Self {
-        let (grid, heights) = (&scene.columns.grid, &scene.columns.heights);
+        let (grid, heights) = (&liquid.columns.grid, &liquid.columns.heights);
         let slope = (0.5 * heights.unit / grid.cell) as f32;
         Self {
-            shown: Shown { scene, heights: shown, slope },
+            shown: Shown { liquid, heights: shown, slope },
             found,
             walls,
             velocity: depths.velocity,
             carried: depths.carried,
             wants_normals,
-            frame: Frame::of(scene.columns, layout),
+            frame: Frame::of(liquid.columns, layout),
             scale: layout.scale as f32,
-            least: (layout.least_depth / heights.unit).min(f64::from(i32::MAX / 2)) as i32,
+            skirt_sink: (layout.least_depth / heights.unit).min(f64::from(i32::MAX / 2)) as i32,
         }
     }
 
     /// Writes all vertices.
-    pub fn write(&self, normals: &mut Normals, around: &mut Around, target: &mut Target<'_>) {
+    pub fn write(&self, normals: &mut Normals, stencil: &mut Stencil, target: &mut Target<'_>) {
         let vertices = self;
         dispatch!(write_spans(
             vertices: &Vertices<'_>,
             normals: &mut Normals,
-            around: &mut Around,
+            stencil: &mut Stencil,
             target: &mut Target<'_>
         ))
     }
 
-    /// The scalars that a column carries.
+    /// Concentrations in a column.
     #[inline(always)]
     fn carried(&self, index: usize) -> [f32; MAX_SCALARS] {
         self.carried.map(|numbers| numbers.get(index).copied().unwrap_or_default())
     }
 
-    /// A vertex with the mean of the wet columns around cell (x, z), at a height of at most `most` (units).
-    fn mean(&self, [x, z]: [usize; 2], most: i32, normals: &mut Normals, around: &Around) -> Vertex {
-        let mean = around.mean_height(|index| self.shown.heights[index]);
-        let height = self.frame.height(mean.min(f64::from(most)) as f32);
+    /// A vertex at cell (x, z) with the mean of the stencil's columns, at a height of at most `max_height` (units).
+    fn mean(&self, [x, z]: [usize; 2], max_height: i32, normals: &mut Normals, stencil: &Stencil) -> Vertex {
+        let mean = stencil.mean_height(|index| self.shown.heights[index]);
+        let height = self.frame.height(mean.min(f64::from(max_height)) as f32);
         let mut normal = [0.0, 1.0, 0.0];
         if self.wants_normals {
-            let [x, y, z] = around.sum(|index| normals.of(&self.shown, self.found, index));
+            let [x, y, z] = stencil.sum(|index| normals.of(&self.shown, self.found, index));
             let length = ((x * x + z * z) + y * y).sqrt();
             if length > 0.0 {
                 normal = [x / length, y / length, z / length];
@@ -96,28 +97,28 @@ impl<'a> Vertices<'a> {
         }
         let mut velocity = [0.0; 2];
         if !self.velocity.is_empty() {
-            velocity = around.sum(|index| self.velocity[index]).map(|sum| sum / around.len().max(1) as f32);
+            velocity = stencil.sum(|index| self.velocity[index]).map(|sum| sum / stencil.len().max(1) as f32);
         }
         let mut carried = [0.0; MAX_SCALARS];
         if self.carried.iter().any(|numbers| !numbers.is_empty()) {
-            carried = around.sum(|index| self.carried(index)).map(|sum| sum / around.len().max(1) as f32);
+            carried = stencil.sum(|index| self.carried(index)).map(|sum| sum / stencil.len().max(1) as f32);
         }
         let position = [self.frame.centre(0, x as i32), height, self.frame.centre(1, z as i32)];
         Vertex { position, normal, velocity, carried, depth: 0, layer: 0, column: NONE }
     }
 
     /// The vertex of a column.
-    fn vertex(&self, index: usize, normals: &mut Normals, around: &mut Around) -> Vertex {
-        let scene = self.shown.scene;
-        let ([x, z], layer) = (scene.columns.cell(index), scene.columns.layer(index) as u32);
-        if !scene.is_wet(index) {
+    fn vertex(&self, index: usize, normals: &mut Normals, stencil: &mut Stencil) -> Vertex {
+        let liquid = self.shown.liquid;
+        let ([x, z], layer) = (liquid.columns.cell(index), liquid.columns.layer(index) as u32);
+        if !liquid.is_wet(index) {
             let mut walls = walls_of(self.walls, index as u32);
             match walls.find(|&wall| self.walls[wall].is_own) {
-                Some(own) => around.take_wall(scene, &self.walls[own]),
-                None => around.take_linked(scene, index),
+                Some(own) => stencil.take_wall(liquid, &self.walls[own]),
+                None => stencil.take_linked(liquid, index),
             }
-            // At most the column's own height: above lower ground the rim would hover.
-            let mean = self.mean([x, z], self.shown.heights[index], normals, around);
+            // At most the column's own height, or the rim would hover over ground that falls away.
+            let mean = self.mean([x, z], self.shown.heights[index], normals, stencil);
             return Vertex { layer, column: index as u32, ..mean };
         }
         let height = self.frame.height(self.shown.heights[index] as f32);
@@ -130,20 +131,20 @@ impl<'a> Vertices<'a> {
             },
             velocity: self.velocity.get(index).copied().unwrap_or_default(),
             carried: self.carried(index),
-            depth: scene.depth[index],
+            depth: liquid.depth[index],
             layer,
             column: index as u32,
         }
     }
 
-    /// Writes the vertex where the surface of a column comes down to the ground's edge.
-    pub fn put_hem(&self, at: usize, hem: &Hem, target: &mut Target<'_>) {
-        let columns = self.shown.scene.columns;
-        let index = hem.column as usize;
+    /// Writes a skirt vertex.
+    pub fn put_skirt_vertex(&self, at: usize, skirt_vertex: &SkirtVertex, target: &mut Target<'_>) {
+        let columns = self.shown.liquid.columns;
+        let index = skirt_vertex.column as usize;
         let [x, z] = columns.cell(index);
-        let [along, across] = hem.offset();
-        let rise = hem.rise * self.scale / self.frame.unit;
-        let ground = columns.bases()[index].wrapping_sub(self.least) as f32 + rise;
+        let [along, across] = skirt_vertex.offset();
+        let rise = skirt_vertex.rise * self.scale / self.frame.unit;
+        let ground = columns.bases()[index].wrapping_sub(self.skirt_sink) as f32 + rise;
         let height = self.frame.height(ground.max(columns.unders()[index] as f32));
         let fall = self.frame.height(self.shown.heights[index] as f32) - height;
         let width = (along * along + across * across).sqrt();
@@ -237,11 +238,11 @@ impl<'a> Vertices<'a> {
         normals
     }
 
-    /// Writes all vertex data of a run except the normals, starting at `at`.
+    /// Writes everything but the normals of a run, starting at vertex `at`.
     #[inline(always)]
     fn put_run(&self, span: &Span, run: Run, at: usize, target: &mut Target<'_>) {
-        let (heights, depths) = (self.shown.heights, self.shown.scene.depth);
-        let strip = self.shown.scene.columns.strips()[span.first];
+        let (heights, depths) = (self.shown.heights, self.shown.liquid.depth);
+        let strip = self.shown.liquid.columns.strips()[span.first];
         let Run { first, len } = run;
         let step = first - span.first * STRIP;
         let depth = &depths[first..][..len];
@@ -291,7 +292,12 @@ fn vectors(out: &mut [f32], at: usize, count: usize) -> &mut [[f32; 3]] {
 }
 
 #[inline(always)]
-fn write_spans(vertices: &Vertices<'_>, normals: &mut Normals, around: &mut Around, target: &mut Target<'_>) {
+fn write_spans(
+    vertices: &Vertices<'_>,
+    normals: &mut Normals,
+    stencil: &mut Stencil,
+    target: &mut Target<'_>,
+) {
     let found = vertices.found;
     let mut next = 0;
     for span in &found.spans {
@@ -305,24 +311,24 @@ fn write_spans(vertices: &Vertices<'_>, normals: &mut Normals, around: &mut Arou
                 run = Run { first: if run.len == 0 { first } else { run.first }, len: run.len + STRIP };
                 continue;
             }
-            // Columns that continue the previous run, and columns that start one for the next strip.
-            let before = if run.len > 0 { plain.trailing_ones() } else { 0 };
-            let behind = plain.leading_ones();
-            let behind = if behind < LONG { 0 } else { behind };
-            run.len += before as usize;
+            // How many of the first columns continue the previous run, and how many of the last ones start a new run.
+            let first_columns = if run.len > 0 { plain.trailing_ones() } else { 0 };
+            let last_columns = plain.leading_ones();
+            let last_columns = if last_columns < LONG { 0 } else { last_columns };
+            run.len += first_columns as usize;
             if run.len > 0 {
                 vertices.put_inner(span, run, next, target);
                 next += run.len;
             }
-            let between = u16::MAX << before & (u32::from(u16::MAX) >> behind) as u16;
-            // What lies between the columns that are written one by one.
+            let between = u16::MAX << first_columns & (u32::from(u16::MAX) >> last_columns) as u16;
+            // Columns that need not be written one by one.
             let smooth = state.used & state.wet & !state.rough & between;
             let mut left = state.used & between;
             while left != 0 {
                 let position = left.trailing_zeros();
                 let len = (smooth >> position).trailing_ones();
                 if len <= SHORT {
-                    let vertex = vertices.vertex(first + position as usize, normals, around);
+                    let vertex = vertices.vertex(first + position as usize, normals, stencil);
                     vertices.frame.put(next, &vertex, target);
                     next += 1;
                     left &= left - 1;
@@ -333,19 +339,19 @@ fn write_spans(vertices: &Vertices<'_>, normals: &mut Normals, around: &mut Arou
                 next += len as usize;
                 left &= u16::MAX.checked_shl(end).unwrap_or(0);
             }
-            run = Run { first: first + STRIP - behind as usize, len: behind as usize };
+            run = Run { first: first + STRIP - last_columns as usize, len: last_columns as usize };
         }
         if run.len > 0 {
             vertices.put_inner(span, run, next, target);
             next += run.len;
         }
     }
-    let columns = vertices.shown.scene.columns;
+    let columns = vertices.shown.liquid.columns;
     for wall in vertices.walls.iter().filter(|wall| wall.vertex != NONE) {
-        around.take_wall(vertices.shown.scene, wall);
+        stencil.take_wall(vertices.shown.liquid, wall);
         let members = wall.members.iter().filter(|member| **member != NONE);
         let layer = members.map(|&member| columns.layer(member as usize) as u32).min().unwrap_or(0);
-        let mean = vertices.mean(columns.cell(wall.column as usize), i32::MAX, normals, around);
+        let mean = vertices.mean(columns.cell(wall.column as usize), i32::MAX, normals, stencil);
         vertices.frame.put(next, &Vertex { layer, ..mean }, target);
         next += 1;
     }

@@ -25,10 +25,10 @@ use crate::geometry::Vec3;
 use crate::numeric::lists::reset;
 use crate::shallow::columns::grid::{Cells, check_cells};
 use crate::shallow::columns::{Columns, STRIP, Strip};
-use crate::shallow::surface::quartets::links::{Scene, find_above};
+use crate::shallow::surface::quartets::links::{LiquidColumns, find_above};
 
-/// Cut-off of Eq. 4.38: minimum h_v - b_k, in cells.
-const LEAST_RISE: f64 = 1e-10;
+/// Cut-off of Eq. 4.38: minimum of h_v - b_k, in cells.
+const MIN_RISE: f64 = 1e-10;
 
 /// Distances between a thin film and the terrain's mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,10 +48,10 @@ impl Default for Distance {
     }
 }
 
-/// Counts of the vertices that a call examined: those that face up, within a quartet.
+/// Counts of the vertices that a call examined.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Fitted {
-    /// Number of them.
+    /// Vertices that face up, within a quartet.
     pub upward: usize,
     /// Of these, those that would need a height of over a cell above the highest base around: they may be above the surface.
     pub discarded: usize,
@@ -64,28 +64,32 @@ pub struct Fitted {
 pub struct MinimumHeights {
     least: Vec<i32>,
     sunk: Vec<i32>,
-    /// The strips of these arrays, and all three as they were before the last change.
+    /// The strips of these arrays.
     strips: Vec<Strip>,
+    /// `least`, `sunk` and `strips` before the last change: scratch.
     old: (Vec<i32>, Vec<i32>, Vec<Strip>),
     above: Vec<u32>,
     /// Uncovered vertices of the last call.
     uncovered: Vec<u32>,
-    /// For each vertex of the mesh, the area of the triangles around it, seen from above: negative where they face down.
+    /// For each vertex of the mesh, twice the signed area, seen from above, of the triangles around it: negative where they face down.
     facing: Vec<f64>,
 }
 
-/// Three columns that a film links, the one at the right angle first: barycentric coordinates of a vertex, bases minus its height (units).
-struct Triple {
+/// A triangle of columns that a film links, over or under a vertex of the terrain.
+struct FilmTriangle {
+    /// The one at the right angle first.
     columns: [usize; 3],
-    parts: [f64; 3],
+    /// Barycentric coordinates of the vertex.
+    barycentric: [f64; 3],
+    /// Bases minus the height of the vertex (units).
     rises: [f64; 3],
     /// Minimum heights (units).
-    lifts: [f64; 3],
+    min_heights: [f64; 3],
 }
 
 /// The cells whose columns are recomputed, and lengths in units.
 struct Area<'a> {
-    scene: Scene<'a>,
+    liquid: LiquidColumns<'a>,
     cells: Cells,
     cell: f64,
     least: f64,
@@ -114,7 +118,8 @@ impl MinimumHeights {
         &self.least
     }
 
-    /// How far below its base each index is shown where it is dry (units), for [`Depths::sunk`](crate::shallow::surface::Depths::sunk); 0 without a column.
+    /// How far below its base each index is shown where it is dry (units), for [`Depths::sunk`](crate::shallow::surface::Depths::sunk); 0
+    /// without a column.
     pub fn sunk(&self) -> &[i32] {
         &self.sunk
     }
@@ -167,12 +172,12 @@ impl MinimumHeights {
             let Range { start, end } = cells[axis];
             if start == end { start..end } else { start.saturating_sub(1)..(end + 1).min(size[axis]) }
         });
-        self.follow(columns);
+        self.reindex(columns);
         let cell = columns.grid.cell / columns.heights.unit;
         find_above(columns, &mut self.above);
-        let scene = Scene { columns, depth: &[], above: &self.above };
-        let area = Area { scene, cells, cell, least: least * cell, margin: margin * cell, rim: rim * cell };
-        area.face(positions, triangles, &mut self.facing)?;
+        let liquid = LiquidColumns { columns, depth: &[], above: &self.above };
+        let area = Area { liquid, cells, cell, least: least * cell, margin: margin * cell, rim: rim * cell };
+        area.find_facing(positions, triangles, &mut self.facing)?;
         area.clear(&mut self.least, &mut self.sunk);
         self.uncovered.clear();
         let mut out = Fitted::default();
@@ -187,7 +192,7 @@ impl MinimumHeights {
     }
 
     /// Moves the known values to the current indices of the same columns.
-    fn follow(&mut self, columns: &Columns) {
+    fn reindex(&mut self, columns: &Columns) {
         let now = columns.strips();
         if self.strips == now {
             return;
@@ -213,13 +218,13 @@ impl MinimumHeights {
 }
 
 impl Area<'_> {
-    /// Finds twice the area, seen from above, of the triangles around each vertex in the quartets of these cells, and around some others.
-    fn face(&self, positions: &[Vec3], triangles: &[[u32; 3]], facing: &mut Vec<f64>) -> Result<()> {
+    /// Finds the area (`facing`) of the triangles around each vertex in the quartets of these cells, and around some others.
+    fn find_facing(&self, positions: &[Vec3], triangles: &[[u32; 3]], facing: &mut Vec<f64>) -> Result<()> {
         if let Some(bad) = positions.iter().position(|p| !p.iter().all(|length| length.is_finite())) {
             return Err(Error::argument(format!("vertex {bad} of the terrain is not finite")));
         }
         reset(facing, positions.len(), 0.0);
-        let grid = self.scene.columns.grid;
+        let grid = self.liquid.columns.grid;
         let [x, z] = [0, 1].map(|axis| {
             let Range { start, end } = self.cells[axis];
             let at = |cell: f64| grid.origin[axis] + cell * grid.cell;
@@ -245,9 +250,9 @@ impl Area<'_> {
         Ok(())
     }
 
-    /// Resets the columns of the box to their values without a vertex above.
+    /// Resets the columns of the box to their values without any vertex.
     fn clear(&self, least: &mut [i32], sunk: &mut [i32]) {
-        let columns = self.scene.columns;
+        let columns = self.liquid.columns;
         let [across, rows] = &self.cells;
         for row in rows.clone() {
             for strip in columns.row(row) {
@@ -255,28 +260,29 @@ impl Area<'_> {
                 for position in (0..STRIP).filter(|position| across.contains(&(first + position))) {
                     let index = strip * STRIP + position;
                     let is_column = columns.is_column(index);
-                    least[index] = if is_column { self.lift(index, self.least) } else { 0 };
-                    sunk[index] = if is_column { self.sink(index, self.rim) } else { 0 };
+                    least[index] = if is_column { self.limited_height(index, self.least) } else { 0 };
+                    sunk[index] = if is_column { self.limited_sink(index, self.rim) } else { 0 };
                 }
             }
         }
     }
 
-    /// A minimum height of a column in whole units, within its room.
-    fn lift(&self, index: usize, lift: f64) -> i32 {
-        (lift.ceil() as i32).min(self.scene.columns.ceilings()[index] - self.scene.columns.bases()[index])
+    /// A minimum height of a column in whole units, up to its ceiling.
+    fn limited_height(&self, index: usize, min_height: f64) -> i32 {
+        (min_height.ceil() as i32)
+            .min(self.liquid.columns.ceilings()[index] - self.liquid.columns.bases()[index])
     }
 
-    /// A displacement down from a column's base in whole units, within its solid.
-    fn sink(&self, index: usize, sink: f64) -> i32 {
+    /// How far a dry column is lowered, in whole units, within its solid.
+    fn limited_sink(&self, index: usize, sink: f64) -> i32 {
         (sink.ceil() as i32).min(
-            self.scene.columns.bases()[index].saturating_sub(self.scene.columns.unders()[index]).max(1) - 1,
+            self.liquid.columns.bases()[index].saturating_sub(self.liquid.columns.unders()[index]).max(1) - 1,
         )
     }
 
     /// Raises and lowers columns for a vertex that faces up.
     fn fit(&self, at: &Vec3, numbers: [&mut [i32]; 2], out: &mut Fitted) {
-        let (grid, heights) = (self.scene.columns.grid, self.scene.columns.heights);
+        let (grid, heights) = (self.liquid.columns.grid, self.liquid.columns.heights);
         let position = [f64::from(at.x), f64::from(at.z)];
         let position = [0, 1].map(|axis| (position[axis] - grid.origin[axis]) / grid.cell - 0.5);
         let [across, along] = [0, 1].map(|axis| self.quartets(axis, position[axis]));
@@ -285,18 +291,18 @@ impl Area<'_> {
         }
         let height = (f64::from(at.y) - heights.low) / heights.unit;
         // A vertex on a line between quartets is in both.
-        let mut triples = [const { None::<Triple> }; 16];
+        let mut triangles = [const { None::<FilmTriangle> }; 16];
         let quartets = along.flat_map(|z| across.clone().map(move |x| [x, z]));
         let found = quartets.flat_map(|[x, z]| {
-            self.triples([x, z], [position[0] - x as f64, position[1] - z as f64], height)
+            self.triangles([x, z], [position[0] - x as f64, position[1] - z as f64], height)
         });
-        triples.iter_mut().zip(found).for_each(|(out, triple)| *out = Some(triple));
-        self.fit_triples(triples.iter().flatten(), numbers, out);
+        triangles.iter_mut().zip(found).for_each(|(out, triangle)| *out = Some(triangle));
+        self.fit_triangles(triangles.iter().flatten(), numbers, out);
     }
 
-    /// The quartets along an axis that contain a cell of the box and a position, which counts in cells from the centre of the first cell.
+    /// The quartets along an axis that contain a cell of the box and a position (cells, from the centre of the first cell).
     fn quartets(&self, axis: usize, position: f64) -> Range<usize> {
-        let last = self.scene.columns.grid.size[axis] - 1;
+        let last = self.liquid.columns.grid.size[axis] - 1;
         let cells = &self.cells[axis];
         let range = cells.start.saturating_sub(1)..cells.end.min(last);
         if cells.is_empty()
@@ -311,13 +317,18 @@ impl Area<'_> {
         start.max(range.start)..(first + 1).min(range.end)
     }
 
-    /// The film triangles in a quartet that contain a position: at most one along each diagonal, or both on a diagonal itself.
-    fn triples(&self, [x, z]: [usize; 2], [u, w]: [f64; 2], height: f64) -> impl Iterator<Item = Triple> {
-        let scene = self.scene;
+    /// The film triangles in a quartet that contain a position: at most one for each diagonal, or two if it lies on the diagonal.
+    fn triangles(
+        &self,
+        [x, z]: [usize; 2],
+        [u, w]: [f64; 2],
+        height: f64,
+    ) -> impl Iterator<Item = FilmTriangle> {
+        let liquid = self.liquid;
         let (bases, unders, ceilings) =
-            (scene.columns.bases(), scene.columns.unders(), scene.columns.ceilings());
+            (liquid.columns.bases(), liquid.columns.unders(), liquid.columns.ceilings());
         let four: [Option<usize>; 4] = std::array::from_fn(|corner| {
-            let mut columns = scene.of_cell([x + (corner & 1), z + (corner >> 1)]);
+            let mut columns = liquid.of_cell([x + (corner & 1), z + (corner >> 1)]);
             columns.find(|&index| f64::from(unders[index]) <= height && height < f64::from(ceilings[index]))
         });
         (0..4).filter_map(move |corner| {
@@ -331,108 +342,115 @@ impl Area<'_> {
                 columns.iter().all(|&other| (unders[own]..ceilings[own]).contains(&bases[other]))
             });
             let rises = columns.map(|column| f64::from(bases[column]) - height);
-            let triple = Triple { columns, parts: [1.0 - (p + q), p, q], rises, lifts: [self.least; 3] };
-            is_linked.then(|| Triple { lifts: self.lifts(&triple), ..triple })
+            let triangle = FilmTriangle {
+                columns,
+                barycentric: [1.0 - (p + q), p, q],
+                rises,
+                min_heights: [self.least; 3],
+            };
+            is_linked.then(|| FilmTriangle { min_heights: self.min_heights(&triangle), ..triangle })
         })
     }
 
     /// Raises and lowers the columns of all triangles that contain a vertex.
-    fn fit_triples<'t>(
+    fn fit_triangles<'t>(
         &self,
-        triples: impl Iterator<Item = &'t Triple> + Clone,
+        triangles: impl Iterator<Item = &'t FilmTriangle> + Clone,
         [least, sunk]: [&mut [i32]; 2],
         out: &mut Fitted,
     ) {
         out.upward += 1;
-        let highest = triples.clone().flat_map(|triple| triple.rises).fold(f64::NEG_INFINITY, f64::max);
-        let is_high = |triple: &Triple| {
-            let is_lifted = |k: usize| triple.parts[k] > 0.0 && triple.lifts[k] > self.least;
-            (0..3).any(|k| is_lifted(k) && triple.rises[k] + triple.lifts[k] > highest + self.cell)
+        let highest = triangles.clone().flat_map(|triangle| triangle.rises).fold(f64::NEG_INFINITY, f64::max);
+        let is_high = |triangle: &FilmTriangle| {
+            let is_lifted = |k: usize| triangle.barycentric[k] > 0.0 && triangle.min_heights[k] > self.least;
+            (0..3).any(|k| is_lifted(k) && triangle.rises[k] + triangle.min_heights[k] > highest + self.cell)
         };
-        if triples.clone().any(is_high) {
+        if triangles.clone().any(is_high) {
             out.discarded += 1;
         } else {
             let mut is_capped = false;
-            for triple in triples.clone() {
-                let lifts = triple.lifts;
-                let lifted = [0, 1, 2].map(|k| self.lift(triple.columns[k], lifts[k]));
-                for (&column, lifted) in triple.columns.iter().zip(lifted) {
+            for triangle in triangles.clone() {
+                let min_heights = triangle.min_heights;
+                let lifted = [0, 1, 2].map(|k| self.limited_height(triangle.columns[k], min_heights[k]));
+                for (&column, lifted) in triangle.columns.iter().zip(lifted) {
                     if self.has(column) {
                         least[column] = least[column].max(lifted);
                     }
                 }
-                let heights = [0, 1, 2].map(|k| triple.rises[k] + f64::from(lifted[k]));
-                is_capped |=
-                    (0..3).any(|k| f64::from(lifted[k]) < lifts[k]) && triple.mean(heights) < self.margin;
+                let heights = [0, 1, 2].map(|k| triangle.rises[k] + f64::from(lifted[k]));
+                is_capped |= (0..3).any(|k| f64::from(lifted[k]) < min_heights[k])
+                    && triangle.mean(heights) < self.margin;
             }
             out.capped += usize::from(is_capped);
         }
-        for triple in triples {
-            for (&column, sink) in triple.columns.iter().zip(self.sinks(triple).unwrap_or_default()) {
+        for triangle in triangles {
+            for (&column, sink) in triangle.columns.iter().zip(self.sinks(triangle).unwrap_or_default()) {
                 if self.has(column) {
-                    sunk[column] = sunk[column].max(self.sink(column, sink));
+                    sunk[column] = sunk[column].max(self.limited_sink(column, sink));
                 }
             }
         }
     }
 
     fn has(&self, column: usize) -> bool {
-        let [x, z] = self.scene.columns.cell(column);
+        let [x, z] = self.liquid.columns.cell(column);
         self.cells[0].contains(&x) && self.cells[1].contains(&z)
     }
 
     /// Minimum heights (units) of three columns for a vertex; the global minimum if it is covered anyway.
-    fn lifts(&self, triple: &Triple) -> [f64; 3] {
-        let need = self.margin - triple.mean(triple.rises);
+    fn min_heights(&self, triangle: &FilmTriangle) -> [f64; 3] {
+        let need = self.margin - triangle.mean(triangle.rises);
         if need <= self.least {
             return [self.least; 3];
         }
-        let thesis = triple.rises.map(|rise| (-rise).max(LEAST_RISE * self.cell));
-        let lifts = triple.least_squares(need, self.least, thesis);
-        let most = |lifts: [f64; 3]| lifts.into_iter().fold(0.0, f64::max);
-        if most(lifts) <= self.cell {
-            return lifts;
+        let thesis = triangle.rises.map(|rise| (-rise).max(MIN_RISE * self.cell));
+        let min_heights = triangle.least_squares(need, self.least, thesis);
+        let max = |numbers: [f64; 3]| numbers.into_iter().fold(0.0, f64::max);
+        if max(min_heights) <= self.cell {
+            return min_heights;
         }
-        let equal = triple.least_squares(need, self.least, [1.0; 3]);
-        if most(equal) < most(lifts) { equal } else { lifts }
+        let equal = triangle.least_squares(need, self.least, [1.0; 3]);
+        if max(equal) < max(min_heights) { equal } else { min_heights }
     }
 
-    /// How far (units) three dry columns go down so that a vertex hides what is between them. A vertex more than a cell lower, at the foot
-    /// of a cliff, hides nothing.
-    fn sinks(&self, triple: &Triple) -> Option<[f64; 3]> {
-        let need = self.rim + triple.mean(triple.rises);
+    /// How far (units) three dry columns are lowered so that the terrain at a vertex hides the rim between them. A vertex more than a cell
+    /// lower, at the foot of a cliff, hides nothing.
+    fn sinks(&self, triangle: &FilmTriangle) -> Option<[f64; 3]> {
+        let need = self.rim + triangle.mean(triangle.rises);
         (need > self.rim && need <= self.cell + self.rim)
-            .then(|| triple.least_squares(need, self.rim, [1.0; 3]))
+            .then(|| triangle.least_squares(need, self.rim, [1.0; 3]))
     }
 }
 
-impl Triple {
+impl FilmTriangle {
     /// The mean of three numbers at the vertex, summed in an order that rotates and mirrors with the scene.
     fn mean(&self, of: [f64; 3]) -> f64 {
-        let [a, b, c] = [0, 1, 2].map(|k| self.parts[k] * of[k]);
+        let [a, b, c] = [0, 1, 2].map(|k| self.barycentric[k] * of[k]);
         a + (b + c)
     }
 
-    /// Numbers whose mean at the vertex is `need`, none of them below `least` (itself below `need`), with the minimum sum of squares /
-    /// `ease`.
-    fn least_squares(&self, need: f64, least: f64, ease: [f64; 3]) -> [f64; 3] {
-        let mut out = [least; 3];
-        let mut is_free = self.parts.map(|part| part > 0.0);
+    /// Numbers whose mean at the vertex is `need`, none of them below `min` (itself below `need`), with the minimum sum of their
+    /// squares / `ease`.
+    fn least_squares(&self, need: f64, min: f64, ease: [f64; 3]) -> [f64; 3] {
+        let mut out = [min; 3];
+        let mut is_free = self.barycentric.map(|part| part > 0.0);
         loop {
             let of_free = |numbers: [f64; 3]| {
-                let parts = self.parts;
-                self.mean([0, 1, 2].map(|k| if is_free[k] && parts[k] > 0.0 { numbers[k] } else { 0.0 }))
+                let barycentric = self.barycentric;
+                self.mean(
+                    [0, 1, 2].map(|k| if is_free[k] && barycentric[k] > 0.0 { numbers[k] } else { 0.0 }),
+                )
             };
-            let pulls = [0, 1, 2].map(|k| self.parts[k] * ease[k]);
-            let fixed = self.mean(is_free.map(|is_free| if is_free { 0.0 } else { least }));
+            let pulls = [0, 1, 2].map(|k| self.barycentric[k] * ease[k]);
+            let fixed = self.mean(is_free.map(|is_free| if is_free { 0.0 } else { min }));
             let pull = (need - fixed) / of_free(pulls);
             let mut is_done = true;
             for k in (0..3).filter(|&k| is_free[k]) {
                 out[k] = pull * pulls[k];
             }
             for k in 0..3 {
-                if is_free[k] && out[k] < least {
-                    (out[k], is_free[k], is_done) = (least, false, false);
+                if is_free[k] && out[k] < min {
+                    (out[k], is_free[k], is_done) = (min, false, false);
                 }
             }
             if is_done {

@@ -8,12 +8,13 @@ use crate::shallow::columns::{Columns, STRIP, strip_mut, strip_of};
 use crate::shallow::surface::quartets::strips::Found;
 use crate::shallow::surface::{Depths, Layout};
 
-/// How heights follow from depths (units).
+/// What determines heights, with the depths (units).
 struct Rule<'a> {
     /// Minimum depth of all columns, and how far dry ones are lowered, unless an array gives them.
     least: i32,
-    /// Depth from which a column is at its full height, and its reciprocal.
+    /// Depth from which a column is at its full height.
     fade: i32,
+    /// 1 / `fade`.
     per_fade: f32,
     depth: &'a [i32],
     least_of: &'a [i32],

@@ -1,6 +1,6 @@
 //! The columns of a run of cells in two rows, for quartets that are searched column by column.
 
-use super::links::Scene;
+use super::links::LiquidColumns;
 use super::strips::Found;
 use crate::numeric::lists::refill;
 use crate::shallow::columns::{Columns, NONE, STRIP};
@@ -9,7 +9,7 @@ use crate::shallow::surface::rim::boundary::{Wall, walls_of};
 /// A column, or an extra.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::shallow) struct Entry {
-    /// Index of the column; for an extra, count of indices + its position among the walls.
+    /// Index of the column; for an extra, count of indices + position of its wall among the walls.
     pub id: u32,
     /// Layer of the column.
     pub layer: u32,
@@ -19,7 +19,7 @@ pub(in crate::shallow) struct Entry {
     pub ceiling: i32,
     pub base: i32,
     pub wet: bool,
-    /// The wall that links it with columns beyond those of its height, or [`NONE`].
+    /// Position of its wall among the walls, or [`NONE`]; it links the entry with the wall's members.
     pub wall: u32,
 }
 
@@ -57,7 +57,7 @@ struct Row {
 #[derive(Debug, Default)]
 pub(in crate::shallow::surface) struct Cells {
     rows: [Row; 2],
-    /// Full quartets of each layer.
+    /// Of each layer of the block: its full quartets.
     full: Vec<u16>,
 }
 
@@ -73,20 +73,27 @@ impl Cells {
     }
 
     /// Loads the cells of some quartets of a block.
-    pub fn enter(&mut self, scene: Scene<'_>, found: &Found, walls: &[Wall], block: usize, quartets: u16) {
+    pub fn load(
+        &mut self,
+        liquid: LiquidColumns<'_>,
+        found: &Found,
+        walls: &[Wall],
+        block: usize,
+        quartets: u16,
+    ) {
         let (row, at) = (block / found.across, block % found.across);
         let reaches_east = quartets >> 15 == 1;
         for (cells, row) in self.rows.iter_mut().zip(row..) {
             let [own, east] = &mut cells.strips;
-            find_layers(scene, [row, at], own);
+            find_layers(liquid, [row, at], own);
             east.clear();
             if reaches_east {
-                find_layers(scene, [row, at + 1], east);
+                find_layers(liquid, [row, at + 1], east);
             }
         }
         refill(&mut self.full, self.rows[0].strips[0].iter().map(|&strip| found.states[strip].full));
         let cells = u32::from(quartets) | u32::from(quartets) << 1;
-        self.rows.iter_mut().for_each(|row| row.take(scene, found, walls, cells));
+        self.rows.iter_mut().for_each(|row| row.load(liquid, found, walls, cells));
     }
 
     /// Columns and extras at a corner of a quartet: 0 north-west, 1 north-east, 2 south-west, 3 south-east.
@@ -104,13 +111,13 @@ impl Cells {
 }
 
 /// Finds the strips of a block by layer.
-fn find_layers(scene: Scene<'_>, at: [usize; 2], out: &mut Vec<usize>) {
-    refill(out, std::iter::successors(scene.lowest(at), |&strip| scene.above(strip)));
+fn find_layers(liquid: LiquidColumns<'_>, at: [usize; 2], out: &mut Vec<usize>) {
+    refill(out, std::iter::successors(liquid.lowest(at), |&strip| liquid.above(strip)));
 }
 
 impl Row {
-    fn take(&mut self, scene: Scene<'_>, found: &Found, walls: &[Wall], cells: u32) {
-        let columns = scene.columns;
+    fn load(&mut self, liquid: LiquidColumns<'_>, found: &Found, walls: &[Wall], cells: u32) {
+        let columns = liquid.columns;
         let Self { strips, entries, ends } = self;
         entries.clear();
         for cell in 0..CELLS {
@@ -124,11 +131,11 @@ impl Row {
                     entries.push(Entry {
                         id: index as u32,
                         layer: layer as u32,
-                        height: scene.height(index),
+                        height: liquid.height(index),
                         under: columns.unders()[index],
                         ceiling: columns.ceilings()[index],
                         base: columns.bases()[index],
-                        wet: scene.is_wet(index),
+                        wet: liquid.is_wet(index),
                         wall: NONE,
                     });
                     if found.states[strip].walls >> position & 1 == 1 {

@@ -19,7 +19,11 @@ pub(in crate::shallow::surface) fn divide(four: [&Entry; 4]) -> [[u32; 3]; 2] {
 }
 
 /// The triangle of three columns, of which two are at given corners.
-pub(in crate::shallow::surface) fn three(first: u32, others: [(usize, u32); 2], omitted: usize) -> [u32; 3] {
+pub(in crate::shallow::surface) fn triangle(
+    first: u32,
+    others: [(usize, u32); 2],
+    omitted: usize,
+) -> [u32; 3] {
     let mut ids = [first; 4];
     others.into_iter().for_each(|(corner, id)| ids[corner] = id);
     TRIANGLES[omitted].map(|corner| ids[corner])

@@ -1,19 +1,23 @@
 //! Finds which columns are wet and which quartets are full or odd. Most quartets are full, which comparisons of whole strips detect.
 
-use super::links::Scene;
-use super::strips::{Found, Span, State, count, some};
+use super::links::LiquidColumns;
+use super::strips::{Found, Span, State, count, neighbour};
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{Columns, STRIP};
 
 /// Finds the wet columns, and the strips whose quartets may have one.
-pub(in crate::shallow::surface) fn find_wet(scene: Scene<'_>, active: Option<&[bool]>, found: &mut Found) {
-    dispatch!(find_wet_strips(scene: Scene<'_>, active: Option<&[bool]>, found: &mut Found))
+pub(in crate::shallow::surface) fn find_wet(
+    liquid: LiquidColumns<'_>,
+    active: Option<&[bool]>,
+    found: &mut Found,
+) {
+    dispatch!(find_wet_strips(liquid: LiquidColumns<'_>, active: Option<&[bool]>, found: &mut Found))
 }
 
 #[inline(always)]
-fn find_wet_strips(scene: Scene<'_>, active: Option<&[bool]>, found: &mut Found) {
-    let columns = scene.columns;
-    for (strip, depth) in scene.depth.as_chunks::<STRIP>().0.iter().enumerate() {
+fn find_wet_strips(liquid: LiquidColumns<'_>, active: Option<&[bool]>, found: &mut Found) {
+    let columns = liquid.columns;
+    for (strip, depth) in liquid.depth.as_chunks::<STRIP>().0.iter().enumerate() {
         if active.is_some_and(|active| !active[strip]) {
             continue;
         }
@@ -23,20 +27,20 @@ fn find_wet_strips(scene: Scene<'_>, active: Option<&[bool]>, found: &mut Found)
         }
         if wet != 0 {
             found.states[strip].wet = wet as u16;
-            found.near.set(strip);
-            for side in [columns.north(strip), columns.south(strip)].into_iter().filter_map(some) {
-                found.near.set(side);
+            found.candidates.set(strip);
+            for side in [columns.north(strip), columns.south(strip)].into_iter().filter_map(neighbour) {
+                found.candidates.set(side);
             }
         }
     }
     found.find_spans(columns);
 }
 
-/// Depth, base, ceiling and underside at 16 positions, and at those to the east of them.
+/// Depth, base, ceiling and underside: each at 16 positions, and at the 16 positions one cell to the east.
 type Windows<'a> = [[&'a [i32; STRIP]; 2]; 4];
 
-/// Positions whose quartet is linked as a whole (the highest of its heights is below the lowest ceiling, the lowest not below the highest
-/// underside), and positions where the sum of the heights in the north-east and south-west is larger.
+/// Finds the quartets that are linked as a whole (the highest of their heights is below the lowest ceiling, the lowest not below the highest
+/// underside), and those whose sum of heights is larger at the ends of the diagonal from north-east to south-west.
 #[inline(always)]
 fn compare([depth, base, ceiling, under]: Windows<'_>, south: Windows<'_>) -> [u16; 2] {
     let [depth_s, base_s, ceiling_s, under_s] = south;
@@ -62,15 +66,15 @@ fn compare([depth, base, ceiling, under]: Windows<'_>, south: Windows<'_>) -> [u
 }
 
 /// Finds the full quartets and their vertices, and the odd quartets.
-pub(in crate::shallow::surface) fn find_full(scene: Scene<'_>, found: &mut Found) {
-    dispatch!(find_full_spans(scene: Scene<'_>, found: &mut Found))
+pub(in crate::shallow::surface) fn find_full(liquid: LiquidColumns<'_>, found: &mut Found) {
+    dispatch!(find_full_spans(liquid: LiquidColumns<'_>, found: &mut Found))
 }
 
 #[inline(always)]
-fn find_full_spans(scene: Scene<'_>, found: &mut Found) {
-    let columns = scene.columns;
-    let arrays = [scene.depth, columns.bases(), columns.ceilings(), columns.unders()];
-    // The last strip has no position behind it.
+fn find_full_spans(liquid: LiquidColumns<'_>, found: &mut Found) {
+    let columns = liquid.columns;
+    let arrays = [liquid.depth, columns.bases(), columns.ceilings(), columns.unders()];
+    // No position follows the last strip: its arrays are padded.
     let last = columns.strips().len().saturating_sub(1);
     let mut ends = [[0; STRIP + 1]; 4];
     for (end, numbers) in ends.iter_mut().zip(arrays) {
@@ -83,13 +87,13 @@ fn find_full_spans(scene: Scene<'_>, found: &mut Found) {
         let corners = Corners::of(columns, found, &span);
         let [mut west, mut north_west] = [corners.west, corners.north_west].map(|slot| found.states[slot]);
         let mut wet = found.states[first].wet;
-        let mut wet_south = found.states[found.slot(some(span.south))].wet;
+        let mut wet_south = found.states[found.slot(neighbour(span.south))].wet;
         for step in 0..span.len {
             let strip = first + step;
             let wet_east = found.states[if step == end { corners.east } else { strip + 1 }].wet;
             let mut wet_south_east = 0;
             let (mut full, mut turned) = (0, 0);
-            if let Some(south) = some(span.south).map(|south| south + step) {
+            if let Some(south) = neighbour(span.south).map(|south| south + step) {
                 wet_south_east = found.states[if step == end { corners.south_east } else { south + 1 }].wet;
                 let wets = [wet, from_east(wet, wet_east), wet_south, from_east(wet_south, wet_south_east)];
                 let any = wets[0] | wets[1] | wets[2] | wets[3];
@@ -108,7 +112,7 @@ fn find_full_spans(scene: Scene<'_>, found: &mut Found) {
                     found.full_triangles += 2 * count(full) as usize;
                 }
             }
-            let north = found.states[some(span.north).map_or(none, |north| north + step)];
+            let north = found.states[neighbour(span.north).map_or(none, |north| north + step)];
             let covered =
                 [full, from_west(full, west.full), north.full, from_west(north.full, north_west.full)];
             let state = &mut found.states[strip];
@@ -130,7 +134,7 @@ fn find_full_spans(scene: Scene<'_>, found: &mut Found) {
     }
 }
 
-/// The strips before and behind a span, in its own row and those to the north and south: positions in `states`.
+/// Indices in `states` of strips at the ends of a span, in its own row and in those to the north and south.
 struct Corners {
     west: usize,
     east: usize,
@@ -144,8 +148,8 @@ impl Corners {
         Self {
             west: found.slot(columns.west(span.first)),
             east: found.slot(columns.east(span.first + end)),
-            north_west: found.slot(some(span.north).and_then(|north| columns.west(north))),
-            south_east: found.slot(some(span.south).and_then(|south| columns.east(south + end))),
+            north_west: found.slot(neighbour(span.north).and_then(|north| columns.west(north))),
+            south_east: found.slot(neighbour(span.south).and_then(|south| columns.east(south + end))),
         }
     }
 }
@@ -162,7 +166,7 @@ fn from_west(own: u16, west: u16) -> u16 {
     own << 1 | west >> 15
 }
 
-/// 16 positions of a strip and the next one.
+/// The windows of a strip; the next strip follows to the east of its last position.
 #[inline(always)]
 fn windows(arrays: [&[i32]; 4], strip: usize) -> Windows<'_> {
     let [a, b, c, d] = arrays;
@@ -175,8 +179,8 @@ fn window(numbers: &[i32], strip: usize) -> [&[i32; STRIP]; 2] {
     [window.first_chunk().expect("16 of 17"), window.last_chunk().expect("16 of 17")]
 }
 
-/// Chooses diagonals: the quartets to divide from north-east to south-west, from which corners are wet and where the sum of the heights
-/// there is larger.
+/// The quartets to divide from north-east to south-west, given the wet corners, and the quartets (`max`) where the sum of heights is larger
+/// along that diagonal.
 #[inline(always)]
 fn choose([a, b, c, d]: [u16; 4], max: u16) -> u16 {
     if a & b & c & d == u16::MAX {
@@ -190,8 +194,8 @@ fn choose([a, b, c, d]: [u16; 4], max: u16) -> u16 {
     from_east_end & !from_west_end | both | neither
 }
 
-/// Marks the odd quartets around a strip's wet columns; `covered` has the columns whose quartets to the south-east, south-west, north-east
-/// and north-west are full.
+/// Marks the odd quartets around a strip's wet columns. `covered`: the columns whose quartet to the south-east, south-west, north-east and
+/// north-west is full.
 fn add_odd(columns: &Columns, found: &mut Found, strip: usize, covered: [u16; 4]) {
     let position = columns.strips()[strip];
     let (row, at) = (position.row as usize, position.at as usize);

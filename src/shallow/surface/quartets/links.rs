@@ -14,17 +14,17 @@ pub(in crate::shallow::surface) fn are_near(a: usize, b: usize) -> bool {
     a != b && RING[a][0].abs_diff(RING[b][0]) <= 1 && RING[a][1].abs_diff(RING[b][1]) <= 1
 }
 
-/// Columns and the liquid in them.
+/// Columns, and the depth of the liquid in each.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::shallow::surface) struct Scene<'a> {
+pub(in crate::shallow::surface) struct LiquidColumns<'a> {
     pub columns: &'a Columns,
     /// Depth of each index (units).
     pub depth: &'a [i32],
-    /// For each strip, the (probable) position of the strip in the layer above, or where it would be; may be empty.
+    /// For each strip, a guess of the index of the strip in the layer above, or of the index at which it would be inserted; may be empty.
     pub above: &'a [u32],
 }
 
-impl<'a> Scene<'a> {
+impl<'a> LiquidColumns<'a> {
     pub fn is_wet(self, index: usize) -> bool {
         self.depth[index] > 0
     }
@@ -78,7 +78,7 @@ impl<'a> Scene<'a> {
         stack.map(move |strip| strip * STRIP + x % STRIP).take_while(move |&index| columns.is_column(index))
     }
 
-    /// The wet column that a column is linked with in the cell at such a step.
+    /// The wet column that a column is linked with in the cell at a step of -1, 0 or 1 along x and z.
     pub fn wet_beside(self, index: usize, step: [i32; 2]) -> Option<usize> {
         let height = self.height(index);
         let other = self.beside(index, step, height)?;
@@ -101,7 +101,7 @@ impl<'a> Scene<'a> {
         self.find(Strip { layer: own.layer + 1, ..own }, guess, strip + 1..end.min(strip + across + 1))
     }
 
-    /// A strip within a range; `guess`, where it is or would be, is usually right.
+    /// Finds a strip within a range; `guess` (its index, or where it would be inserted) is usually right.
     #[inline]
     fn find(self, wanted: Strip, guess: usize, range: Range<usize>) -> Option<usize> {
         let strips = self.columns.strips();
@@ -127,12 +127,12 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// The cell at a step from another; a step before the first cell wraps around to one outside the grid.
+/// The cell at a step from another. Before the first cell, indices wrap around to huge ones outside the grid.
 pub(in crate::shallow::surface) fn cell_at([x, z]: [usize; 2], [dx, dz]: [i32; 2]) -> [usize; 2] {
     [x.wrapping_add_signed(dx as isize), z.wrapping_add_signed(dz as isize)]
 }
 
-/// Finds, for each strip, where the one above is or would be.
+/// Finds, for each strip, the index of the one above, or where it would be inserted.
 pub(in crate::shallow::surface) fn find_above(columns: &Columns, out: &mut Vec<u32>) {
     let strips = columns.strips();
     let across = columns.grid.size[0].div_ceil(STRIP);
@@ -171,12 +171,12 @@ mod tests {
         find_above(&columns, &mut above);
         let wrong: Vec<u32> = above.iter().rev().copied().collect();
         for above in [&above[..], &wrong, &[]] {
-            let scene = Scene { columns: &columns, depth: &[], above };
+            let liquid = LiquidColumns { columns: &columns, depth: &[], above };
             for cell in (0..80).flat_map(|x| [[x, 0], [x, 1]]) {
-                assert!(scene.of_cell(cell).eq(columns.of_cell(cell)), "{cell:?}");
+                assert!(liquid.of_cell(cell).eq(columns.of_cell(cell)), "{cell:?}");
             }
-            assert_eq!(scene.of_cell([80, 0]).chain(scene.of_cell([0, 2])).count(), 0);
-            assert_eq!(scene.of_cell(cell_at([0, 0], [-1, 0])).count(), 0);
+            assert_eq!(liquid.of_cell([80, 0]).chain(liquid.of_cell([0, 2])).count(), 0);
+            assert_eq!(liquid.of_cell(cell_at([0, 0], [-1, 0])).count(), 0);
         }
     }
 
@@ -192,8 +192,8 @@ mod tests {
         for (level, linked) in [(19, low), (20, high), (31, high)] {
             depth[beside] = level - 15;
             depth[high] = 1;
-            let scene = Scene { columns: &columns, depth: &depth, above: &[] };
-            assert_eq!(scene.beside(beside, [-1, 0], level), Some(linked), "{level}");
+            let liquid = LiquidColumns { columns: &columns, depth: &depth, above: &[] };
+            assert_eq!(liquid.beside(beside, [-1, 0], level), Some(linked), "{level}");
         }
     }
 }

@@ -1,20 +1,20 @@
 //! Odd quartets: groups of four and of three linked columns, whatever their layers (thesis 4.2.2).
 
 use super::cells::{Cells, Entry};
-use super::divide::{OTHERS, divide, three};
-use super::links::Scene;
+use super::divide::{OTHERS, divide, triangle};
+use super::links::LiquidColumns;
 use super::strips::{Found, positions};
-use super::wall::Walled;
+use super::wall::WalledQuartet;
 use crate::shallow::surface::rim::boundary::Walls;
 
 /// Scratch buffers of a search for groups.
 #[derive(Debug, Default)]
 pub(in crate::shallow::surface) struct Search {
     cells: Cells,
-    /// The columns of a quartet's triangles.
+    /// Triangles of the quartet that was searched last.
     triangles: Vec<[u32; 3]>,
-    walled: Walled,
-    /// The triangles of odd quartets that have any, without and with walls, and how many each quartet has.
+    walled_quartet: WalledQuartet,
+    /// Triangles of all odd quartets without walls (0) and with walls (1), and how many each quartet has; quartets without any are left out.
     found: [Vec<[u32; 3]>; 2],
     counts: [Vec<u32>; 2],
 }
@@ -23,27 +23,28 @@ impl Search {
     /// Reserves memory for this many layers, odd quartets and triangles.
     pub fn reserve(&mut self, layers: usize, quartets: usize, triangles: usize) {
         self.cells.reserve(layers);
-        // In each cell, at most one extra per column of the eight cells around.
-        self.walled.reserve(4 * layers * (1 + 8));
+        // A cell has at most one extra per column of the eight cells around it.
+        self.walled_quartet.reserve(4 * layers * (1 + 8));
         self.triangles.reserve(32 * layers);
-        self.forget();
+        self.clear();
         self.found.iter_mut().for_each(|found| found.reserve(triangles));
         self.counts.iter_mut().for_each(|counts| counts.reserve(quartets));
     }
 
     /// Clears the previous frame.
-    fn forget(&mut self) {
+    fn clear(&mut self) {
         self.found.iter_mut().for_each(Vec::clear);
         self.counts.iter_mut().for_each(Vec::clear);
     }
 
-    /// Stores the triangles of a quartet without walls (0), or with (1).
+    /// Stores the quartet's triangles; `kind`: without walls (0) or with walls (1).
     fn keep(&mut self, kind: usize) {
         self.counts[kind].push(self.triangles.len() as u32);
         self.found[kind].extend_from_slice(&self.triangles);
     }
 
-    /// Finds the triangles of a quartet without walls; if it has any, calls `add_wall` with each and returns false.
+    /// Finds the triangles of a quartet, as if without walls. If surfaces end at walls there, calls `add_wall` with the column of each and
+    /// returns false.
     fn find(&mut self, quartet: usize, mut add_wall: impl FnMut(u32)) -> bool {
         self.triangles.clear();
         let mut has_wall = false;
@@ -53,36 +54,36 @@ impl Search {
                     continue;
                 }
                 // A column is linked with at most one column of each cell: the one whose room holds its height.
-                let mut near = [None; 4];
+                let mut linked = [None; 4];
                 for other in others {
                     if let Some(holder) =
                         self.cells.corner(quartet, other).iter().find(|entry| entry.holds(wet.height))
                     {
                         if wet.holds(holder.height) {
-                            near[other] = Some(holder);
+                            linked[other] = Some(holder);
                         } else if wet.ends_at(holder) {
                             has_wall = true;
                             add_wall(holder.id);
                         }
                     }
                 }
-                add_triangles(corner, wet, near, &mut self.triangles);
+                add_triangles(corner, wet, linked, &mut self.triangles);
             }
         }
         !has_wall
     }
 }
 
-/// Adds the triangles of groups whose first wet column is `wet`, at `corner`, given the columns that it is linked with.
+/// Adds the triangles of groups whose first wet column is `wet`, at `corner`, given the columns at the other corners that it is linked with.
 #[inline(always)]
-pub fn add_triangles(corner: usize, wet: &Entry, near: [Option<&Entry>; 4], triangles: &mut Vec<[u32; 3]>) {
-    let fit = |a: &Entry, b: &Entry| !a.wet && !b.wet || a.is_linked(b);
+pub fn add_triangles(corner: usize, wet: &Entry, linked: [Option<&Entry>; 4], triangles: &mut Vec<[u32; 3]>) {
+    let may_join = |a: &Entry, b: &Entry| !a.wet && !b.wet || a.is_linked(b);
     let is_first = |at: usize, entry: &Entry| at > corner || !entry.wet;
     let [p, q, r] = OTHERS[corner];
-    if let (Some(x), Some(y), Some(z)) = (near[p], near[q], near[r])
-        && fit(x, y)
-        && fit(x, z)
-        && fit(y, z)
+    if let (Some(x), Some(y), Some(z)) = (linked[p], linked[q], linked[r])
+        && may_join(x, y)
+        && may_join(x, z)
+        && may_join(y, z)
     {
         if is_first(p, x) && is_first(q, y) && is_first(r, z) {
             let mut four = [wet; 4];
@@ -92,30 +93,30 @@ pub fn add_triangles(corner: usize, wet: &Entry, near: [Option<&Entry>; 4], tria
         return;
     }
     for [first, second, omitted] in [[p, q, r], [p, r, q], [q, r, p]] {
-        if let (Some(x), Some(y)) = (near[first], near[second])
+        if let (Some(x), Some(y)) = (linked[first], linked[second])
             && is_first(first, x)
             && is_first(second, y)
-            && fit(x, y)
+            && may_join(x, y)
         {
-            triangles.push(three(wet.id, [(first, x.id), (second, y.id)], omitted));
+            triangles.push(triangle(wet.id, [(first, x.id), (second, y.id)], omitted));
         }
     }
 }
 
 /// Finds the groups of odd quartets, marks their vertices and returns the triangle count.
 pub(in crate::shallow::surface) fn find_groups(
-    scene: Scene<'_>,
+    liquid: LiquidColumns<'_>,
     found: &mut Found,
     walls: &mut Walls,
     search: &mut Search,
 ) -> usize {
     let mut count = 0;
-    search.forget();
+    search.clear();
     let mut has_walls = false;
     each_odd(found, |found, block| {
         let odd = found.blocks[block].odd;
         found.blocks[block].searched = odd;
-        search.cells.enter(scene, found, &[], block, odd);
+        search.cells.load(liquid, found, &[], block, odd);
         for quartet in positions(odd) {
             let is_plain = search.find(quartet, |wall| found.add_wall(wall as usize));
             if is_plain {
@@ -135,16 +136,16 @@ pub(in crate::shallow::surface) fn find_groups(
     if !has_walls {
         return count;
     }
-    walls.find(scene, found);
-    let len = scene.columns.len();
+    walls.find(liquid, found);
+    let len = liquid.columns.len();
     each_odd(found, |found, block| {
         let walled = found.blocks[block].walled;
         if walled == 0 {
             return;
         }
-        search.cells.enter(scene, found, &walls.list, block, walled);
+        search.cells.load(liquid, found, &walls.list, block, walled);
         for quartet in positions(walled) {
-            search.walled.find(&search.cells, &walls.list, quartet, &mut search.triangles);
+            search.walled_quartet.find(&search.cells, &walls.list, quartet, &mut search.triangles);
             search.keep(1);
             count += search.triangles.len();
             for &id in search.triangles.iter().flatten() {

@@ -20,7 +20,7 @@ pub(in crate::shallow::surface) struct State {
     pub walls: u16,
     /// Columns that are vertices.
     pub used: u16,
-    /// The vertex of the first of these.
+    /// Number of the first of these vertices; the others follow.
     pub first: u32,
 }
 
@@ -29,9 +29,9 @@ pub(in crate::shallow::surface) struct State {
 pub(in crate::shallow::surface) struct Block {
     /// Odd quartets.
     pub odd: u16,
-    /// Those in which a surface ends at a wall.
+    /// Odd quartets in which a surface ends at a wall.
     pub walled: u16,
-    /// Quartets that were odd, including those without triangles.
+    /// As `odd`, but including quartets that turned out to have no triangle.
     pub searched: u16,
 }
 
@@ -121,26 +121,26 @@ pub(in crate::shallow::surface) fn positions(bits: impl Into<u64>) -> impl Itera
     })
 }
 
-/// State of all strips.
+/// What the search for groups has found: the state of all strips and blocks.
 #[derive(Debug, Default)]
 pub(in crate::shallow::surface) struct Found {
     /// One per strip, and after the last an empty one, for no strip.
     pub states: Vec<State>,
-    /// One per run of 16 cells, row by row.
+    /// Row by row.
     pub blocks: Vec<Block>,
-    /// Runs of 16 cells in a row.
+    /// Count of blocks in a row.
     pub across: usize,
-    /// Strips that may not be empty: those with a wet column, those around them, and others with vertices or walls.
-    pub near: Bits,
+    /// Strips to search: those with a wet column, those around them, and others with vertices or walls.
+    pub candidates: Bits,
     /// The same, as spans.
     pub spans: Vec<Span>,
-    /// Whether strips were added to `near` since the spans were found.
+    /// Whether strips were added to `candidates` since the spans were found.
     is_stale: bool,
     /// Blocks with odd quartets.
     pub odd: Bits,
     /// Count of triangles of full quartets.
     pub full_triangles: usize,
-    /// Whether a vertex takes the mean of others.
+    /// Whether a vertex (dry or extra) is the mean of others.
     pub has_means: bool,
 }
 
@@ -159,18 +159,18 @@ impl Found {
         }
         spans.clear();
         spans.reserve(strips);
-        self.near.reset(strips);
+        self.candidates.reset(strips);
         self.odd.reset(across * nz);
         self.across = across;
         self.full_triangles = 0;
         self.is_stale = false;
     }
 
-    /// Finds the strips around those with wet columns (those in `near`), and the spans.
+    /// Adds the strips around those with wet columns to `candidates`, and finds the spans.
     pub fn find_spans(&mut self, columns: &Columns) {
-        // A strip and the next one may not lie side by side; then one strip too many is searched.
-        self.near.widen(columns.strips().len());
-        self.near.find_spans(columns, &mut self.spans);
+        // Consecutive strips are not always side by side: a few strips too many are searched.
+        self.candidates.widen(columns.strips().len());
+        self.candidates.find_spans(columns, &mut self.spans);
     }
 
     /// Index of a neighbouring strip in `states`.
@@ -190,8 +190,8 @@ impl Found {
     }
 
     fn state_of(&mut self, strip: usize) -> &mut State {
-        if !self.near.has(strip) {
-            self.near.set(strip);
+        if !self.candidates.has(strip) {
+            self.candidates.set(strip);
             self.is_stale = true;
         }
         &mut self.states[strip]
@@ -200,7 +200,7 @@ impl Found {
     /// Numbers the vertices in order of their columns and returns their count.
     pub fn number(&mut self, columns: &Columns) -> u32 {
         if self.is_stale {
-            self.near.find_spans(columns, &mut self.spans);
+            self.candidates.find_spans(columns, &mut self.spans);
         }
         let (mut next, mut dry) = (0, 0);
         for span in &self.spans {
@@ -222,16 +222,16 @@ impl Found {
     }
 }
 
-/// Count of bits. Usually they are the lowest ones: this case is faster without a popcount instruction.
+/// Count of set bits. They are usually the lowest ones, which is faster where there is no popcount instruction.
 #[inline(always)]
 pub(in crate::shallow::surface) fn count(bits: u16) -> u32 {
     let ones = bits.trailing_ones();
     if u32::from(bits) == (1 << ones) - 1 { ones } else { bits.count_ones() }
 }
 
-/// The strip that a link leads to, if any.
+/// A neighbouring strip, or none for [`NONE`].
 #[inline(always)]
-pub(in crate::shallow::surface) fn some(strip: u32) -> Option<usize> {
+pub(in crate::shallow::surface) fn neighbour(strip: u32) -> Option<usize> {
     (strip != NONE).then_some(strip as usize)
 }
 

@@ -1,33 +1,35 @@
 //! Odd quartets in which a surface ends at a wall: several entries of a cell may be linked with the same entry there.
 
 use super::cells::{Cells, Entry};
-use super::divide::{OTHERS, divide, three};
+use super::divide::{OTHERS, divide, triangle};
 use crate::numeric::lists::reset;
 use crate::shallow::columns::NONE;
 use crate::shallow::surface::rim::boundary::Wall;
 
 /// Entries of a quartet, and their links.
 #[derive(Debug, Default)]
-pub(in crate::shallow::surface) struct Walled {
+pub(in crate::shallow::surface) struct WalledQuartet {
     /// Entries, corner by corner.
     entries: Vec<Entry>,
     /// Where the entries of each corner begin, and the end of the last.
     ends: [usize; 5],
-    /// Bit sets of entries, [`WORD`] bits in a word: members of each wall, members of all walls of its column, links of each wet entry.
+    /// For each entry with a wall, the set of the wall's members, and of the members of all walls of the same column: [`WORD`] bits a word.
     members: Vec<u64>,
     of_column: Vec<u64>,
+    /// For each wet entry, the set of entries that it is linked with.
     links: Vec<u64>,
-    /// Words per entry.
+    /// Words per set.
     words: usize,
-    /// Wet entries; entries that have a wall, with its position among the walls.
+    /// Wet entries.
     wet: Vec<usize>,
+    /// Entries that have a wall, and its position among the walls.
     at_walls: Vec<(usize, usize)>,
 }
 
 /// Bits per word.
 const WORD: usize = 64;
 
-impl Walled {
+impl WalledQuartet {
     /// Reserves memory for this many entries.
     pub fn reserve(&mut self, entries: usize) {
         self.clear(0);
@@ -124,7 +126,7 @@ impl Walled {
     }
 
     /// Whether two entries may be in a group.
-    fn fit(&self, a: usize, b: usize) -> bool {
+    fn may_join(&self, a: usize, b: usize) -> bool {
         match (self.entries[a].wet, self.entries[b].wet) {
             (false, false) => true,
             (true, _) => self.has(a, b),
@@ -133,22 +135,22 @@ impl Walled {
     }
 
     /// Entries of a corner that are linked with a wet one.
-    fn near(&self, wet: usize, corner: usize) -> impl Iterator<Item = usize> {
+    fn linked(&self, wet: usize, corner: usize) -> impl Iterator<Item = usize> {
         (self.ends[corner]..self.ends[corner + 1]).filter(move |&other| self.has(wet, other))
     }
 
     /// Adds the triangles of groups whose first wet entry is `own`, at `corner`.
     fn add(&self, corner: usize, own: usize, triangles: &mut Vec<[u32; 3]>) {
         let [p, q, r] = OTHERS[corner];
-        if [p, q, r].into_iter().filter(|&other| self.near(own, other).next().is_some()).count() < 2 {
+        if [p, q, r].into_iter().filter(|&other| self.linked(own, other).next().is_some()).count() < 2 {
             return;
         }
         let wet = &self.entries[own];
         let is_first = |at: usize, entry: usize| at > corner || !self.entries[entry].wet;
-        for x in self.near(own, p).filter(|&x| is_first(p, x)) {
-            for y in self.near(own, q).filter(|&y| is_first(q, y) && self.fit(x, y)) {
-                for z in self.near(own, r) {
-                    if is_first(r, z) && self.fit(x, z) && self.fit(y, z) {
+        for x in self.linked(own, p).filter(|&x| is_first(p, x)) {
+            for y in self.linked(own, q).filter(|&y| is_first(q, y) && self.may_join(x, y)) {
+                for z in self.linked(own, r) {
+                    if is_first(r, z) && self.may_join(x, z) && self.may_join(y, z) {
                         let mut four = [wet; 4];
                         [four[p], four[q], four[r]] = [x, y, z].map(|entry| &self.entries[entry]);
                         triangles.extend(divide(four));
@@ -157,11 +159,11 @@ impl Walled {
             }
         }
         for [first, second, omitted] in [[p, q, r], [p, r, q], [q, r, p]] {
-            for x in self.near(own, first).filter(|&x| is_first(first, x)) {
-                for y in self.near(own, second).filter(|&y| is_first(second, y) && self.fit(x, y)) {
-                    if !self.near(own, omitted).any(|z| self.fit(x, z) && self.fit(y, z)) {
+            for x in self.linked(own, first).filter(|&x| is_first(first, x)) {
+                for y in self.linked(own, second).filter(|&y| is_first(second, y) && self.may_join(x, y)) {
+                    if !self.linked(own, omitted).any(|z| self.may_join(x, z) && self.may_join(y, z)) {
                         let [x_id, y_id] = [x, y].map(|entry| self.entries[entry].id);
-                        triangles.push(three(wet.id, [(first, x_id), (second, y_id)], omitted));
+                        triangles.push(triangle(wet.id, [(first, x_id), (second, y_id)], omitted));
                     }
                 }
             }

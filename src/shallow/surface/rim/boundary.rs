@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::shallow::columns::{NONE, STRIP};
-use crate::shallow::surface::quartets::links::{RING, Scene, are_near, cell_at};
+use crate::shallow::surface::quartets::links::{LiquidColumns, RING, are_near, cell_at};
 use crate::shallow::surface::quartets::strips::{Found, positions};
 
 /// A surface of linked wet columns that ends at a column's solid.
@@ -35,7 +35,7 @@ pub(in crate::shallow::surface) fn walls_of(list: &[Wall], column: u32) -> Range
     first..first + count
 }
 
-/// Walls to reserve beyond those of the terrain: a tool that dips into liquid makes some hundred, in frames that should allocate nothing.
+/// Walls to reserve beyond those of the terrain: a tool that dips into liquid makes hundreds, in frames that should allocate nothing.
 const ROOM: usize = 1024;
 
 /// All walls, in order of columns.
@@ -44,7 +44,7 @@ pub(in crate::shallow::surface) struct Walls {
     pub list: Vec<Wall>,
     /// For each wall, whether a triangle uses its extra vertex.
     pub used: Vec<bool>,
-    /// For one column, the neighbours whose surfaces end at it: position in the ring, index, and whether they have a wall.
+    /// For one column, the neighbours whose surfaces end at it: position in the ring, index, and whether a wall has it as a member.
     nodes: Vec<(usize, u32, bool)>,
 }
 
@@ -63,46 +63,46 @@ impl Walls {
     }
 
     /// Finds the surfaces that end at the columns marked as walls.
-    pub fn find(&mut self, scene: Scene<'_>, found: &Found) {
-        for strip in found.near.iter() {
+    pub fn find(&mut self, liquid: LiquidColumns<'_>, found: &Found) {
+        for strip in found.candidates.iter() {
             for position in positions(found.states[strip].walls) {
-                self.find_at(scene, strip * STRIP + position);
+                self.find_at(liquid, strip * STRIP + position);
             }
         }
         self.used.resize(self.list.len(), false);
     }
 
-    fn find_at(&mut self, scene: Scene<'_>, column: usize) {
-        let cell = scene.columns.cell(column);
+    fn find_at(&mut self, liquid: LiquidColumns<'_>, column: usize) {
+        let cell = liquid.columns.cell(column);
         self.nodes.clear();
         for (ring, step) in RING.into_iter().enumerate() {
-            for other in scene.of_cell(cell_at(cell, step)) {
-                if scene.is_wet(other)
-                    && scene.holds(column, scene.height(other))
-                    && scene.ends_at(other, column)
+            for other in liquid.of_cell(cell_at(cell, step)) {
+                if liquid.is_wet(other)
+                    && liquid.holds(column, liquid.height(other))
+                    && liquid.ends_at(other, column)
                 {
                     self.nodes.push((ring, other as u32, false));
                 }
             }
         }
-        // A dry column's own vertex serves the nodes that are linked with any wet column with which it is itself linked.
-        if !scene.is_wet(column) {
-            let linked = RING.map(|step| scene.wet_beside(column, step));
-            self.add(scene, column, linked, true);
+        // If the column is dry and linked with wet columns, nodes that are linked with these use its own vertex.
+        if !liquid.is_wet(column) {
+            let linked = RING.map(|step| liquid.wet_beside(column, step));
+            self.add(liquid, column, linked, true);
         }
         for first in 0..self.nodes.len() {
             if !self.nodes[first].2 {
-                self.add(scene, column, [None; 8], false);
+                self.add(liquid, column, [None; 8], false);
             }
         }
     }
 
-    /// Adds the wall of the nodes linked with the given columns or, if there are none, that of the first node without a wall; with all
-    /// nodes without a wall that are linked with these, directly or through others.
-    fn add(&mut self, scene: Scene<'_>, column: usize, linked: [Option<usize>; 8], is_own: bool) {
+    /// Adds a wall: nodes that have none yet and are linked with each other, directly or through others. With `is_own` it starts from nodes
+    /// that are linked with the given columns, else from the first node left.
+    fn add(&mut self, liquid: LiquidColumns<'_>, column: usize, linked: [Option<usize>; 8], is_own: bool) {
         let mut members = [NONE; 8];
         let is_linked =
-            |a: (usize, usize), b: (usize, usize)| are_near(a.0, b.0) && scene.are_linked(a.1, b.1);
+            |a: (usize, usize), b: (usize, usize)| are_near(a.0, b.0) && liquid.are_linked(a.1, b.1);
         loop {
             let is_empty = members == [NONE; 8];
             let next = self.nodes.iter().position(|&(ring, index, has_wall)| {
@@ -126,7 +126,7 @@ impl Walls {
         }
         let (mut sum, mut count) = (0, 0);
         for &member in members.iter().filter(|member| **member != NONE) {
-            sum += i64::from(scene.height(member as usize));
+            sum += i64::from(liquid.height(member as usize));
             count += 1;
         }
         if count > 0 {
@@ -146,11 +146,11 @@ impl Walls {
     }
 }
 
-/// The wet columns that a vertex averages: position in the ring, index.
+/// The wet columns whose mean a dry or extra vertex takes: position in the ring around the vertex's cell, and index.
 #[derive(Debug, Default)]
-pub(in crate::shallow::surface) struct Around(Vec<(usize, usize)>);
+pub(in crate::shallow::surface) struct Stencil(Vec<(usize, usize)>);
 
-impl Around {
+impl Stencil {
     /// Reserves memory for the maximum: eight columns, and eight neighbours of each.
     pub fn reserve(&mut self) {
         self.0.clear();
@@ -164,10 +164,10 @@ impl Around {
     }
 
     /// Collects the wet columns that a dry one is linked with.
-    pub fn take_linked(&mut self, scene: Scene<'_>, column: usize) {
+    pub fn take_linked(&mut self, liquid: LiquidColumns<'_>, column: usize) {
         self.0.clear();
         for (ring, step) in RING.into_iter().enumerate() {
-            if let Some(wet) = scene.wet_beside(column, step) {
+            if let Some(wet) = liquid.wet_beside(column, step) {
                 self.0.push((ring, wet));
             }
         }
@@ -175,16 +175,16 @@ impl Around {
 
     /// Collects the members of a wall and the neighbours of its cell that are linked with one of them; if they use its column's vertex,
     /// also the columns that this column is linked with.
-    pub fn take_wall(&mut self, scene: Scene<'_>, wall: &Wall) {
+    pub fn take_wall(&mut self, liquid: LiquidColumns<'_>, wall: &Wall) {
         self.0.clear();
         if wall.is_own {
-            self.take_linked(scene, wall.column as usize);
+            self.take_linked(liquid, wall.column as usize);
         }
         for (ring, &member) in wall.members.iter().enumerate().filter(|(_, member)| **member != NONE) {
             self.add(ring, member as usize);
             for other in (0..8).filter(|&other| are_near(ring, other)) {
                 let step = [RING[other][0] - RING[ring][0], RING[other][1] - RING[ring][1]];
-                if let Some(wet) = scene.wet_beside(member as usize, step) {
+                if let Some(wet) = liquid.wet_beside(member as usize, step) {
                     self.add(other, wet);
                 }
             }

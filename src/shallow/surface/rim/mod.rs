@@ -1,7 +1,7 @@
-//! Where the surface ends: at walls, at the rim of films, over ledges.
+//! Where the surface ends: at walls, and at ledges, where skirts close it.
 
 pub(super) mod boundary;
-pub(super) mod hem;
 pub mod ledges;
 pub mod silhouette;
+pub(super) mod skirt_vertex;
 pub(super) mod skirts;

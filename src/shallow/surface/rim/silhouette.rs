@@ -2,7 +2,7 @@
 //! reach along the line to the middle of the next cell, and how high they are there.
 
 use crate::numeric::lists::{refill, reset};
-use crate::shallow::surface::rim::hem::Hem;
+use crate::shallow::surface::rim::skirt_vertex::SkirtVertex;
 use std::ops::Range;
 
 use super::ledges::Ledges;
@@ -16,19 +16,20 @@ use crate::shallow::surface::{Depths, Surface};
 /// Fits ledges to the silhouette of the ground's mesh; reuses its memory.
 #[derive(Debug, Default)]
 pub struct Silhouette {
-    /// A film on all of the ground (units): where its surface ends, there may be a hem.
+    /// Depth of a film on all of the ground (units), and its surface: skirts are possible only where it ends.
     film: Vec<i32>,
     films: Surface,
-    /// Hems in order of cells, row by row, and how far the ground reaches on their sides in the triangles processed so far.
-    hems: Vec<Hem>,
+    /// Row by row.
+    skirt_vertices: Vec<SkirtVertex>,
+    /// For each of these and each of its sides, how far the ground reaches in the triangles processed so far.
     ends: Vec<[Option<End>; 4]>,
-    crowd: Crowd,
-    /// For each vertex, along x and z, the last cell whose middle is not behind it, clamped to a cell around the domain.
+    counts: CellCounts,
+    /// For each vertex of the mesh, along x and z, the last cell whose middle is not beyond it, clamped to about the domain.
     cells: Vec<[i32; 2]>,
 }
 
 impl Silhouette {
-    /// Finds the ledges of columns and where the ground ends in the mesh that they were made from: the surface extends to there. 8 ms for
+    /// Finds the ledges of columns, and where the ground ends in the mesh that the columns were made from: skirts reach to there. 8 ms for
     /// 380,000 triangles on 200 x 200 cells in several layers (`make bench`).
     ///
     /// # Errors
@@ -47,42 +48,42 @@ impl Silhouette {
             return Err(Error::argument("a face of the ground has a vertex that is not there"));
         }
         ledges.find(columns);
-        ledges.hems.extend_from_slice(self.find(columns, positions, faces)?);
+        ledges.skirt_vertices.extend_from_slice(self.find(columns, positions, faces)?);
         Ok(())
     }
 
-    /// Hems of all columns at which films end within the domain, in their order. Vertices must be finite, and faces must have existing
-    /// vertices.
-    fn find(&mut self, columns: &Columns, positions: &[Vec3], faces: &[[u32; 3]]) -> Result<&[Hem]> {
+    /// Skirt vertices of all columns at which films end within the domain, in order of columns. Vertices must be finite, and the vertices of
+    /// faces must exist.
+    fn find(&mut self, columns: &Columns, positions: &[Vec3], faces: &[[u32; 3]]) -> Result<&[SkirtVertex]> {
         self.find_ends_of_films(columns)?;
-        if self.hems.is_empty() {
+        if self.skirt_vertices.is_empty() {
             return Ok(&[]);
         }
-        self.position(columns);
+        self.sort_by_cell(columns);
         self.find_cells(columns.grid, positions);
         for face in faces {
             let corners = face.map(|vertex| vertex as usize);
-            if let Some(cells) = self.crowd.near(corners.map(|corner| self.cells[corner])) {
+            if let Some(cells) = self.counts.near(corners.map(|corner| self.cells[corner])) {
                 let corners = corners.map(|corner| <[f32; 3]>::from(positions[corner]).map(f64::from));
-                self.cut(columns, corners, cells);
+                self.extend_ends(columns, corners, cells);
             }
         }
-        for (hem, ends) in self.hems.iter_mut().zip(&self.ends) {
+        for (skirt_vertex, ends) in self.skirt_vertices.iter_mut().zip(&self.ends) {
             let mut rise: Option<f64> = None;
-            for (reach, end) in hem.sides.iter_mut().zip(ends) {
+            for (reach, end) in skirt_vertex.sides.iter_mut().zip(ends) {
                 if let (Some(reach), Some(End { at, height })) = (reach, *end) {
                     *reach = at as f32;
                     rise = Some(rise.map_or(height, |other| other.min(height)));
                 }
             }
-            hem.rise = rise.unwrap_or(0.0) as f32;
+            skirt_vertex.rise = rise.unwrap_or(0.0) as f32;
         }
-        self.hems.sort_unstable_by_key(|hem| hem.column);
-        Ok(&self.hems)
+        self.skirt_vertices.sort_unstable_by_key(|skirt_vertex| skirt_vertex.column);
+        Ok(&self.skirt_vertices)
     }
 
     fn find_ends_of_films(&mut self, columns: &Columns) -> Result<()> {
-        let Self { film, films, hems, .. } = self;
+        let Self { film, films, skirt_vertices, .. } = self;
         let (bases, ceilings) = (columns.bases(), columns.ceilings());
         refill(
             film,
@@ -92,20 +93,20 @@ impl Silhouette {
         let mut ledges = Ledges::default();
         ledges.find(columns);
         films.count(columns, &Depths { depth: film, ledges: Some(&ledges), ..Depths::default() })?;
-        films.skirts.hems.clone_into(hems);
+        films.skirts.skirt_vertices.clone_into(skirt_vertices);
         Ok(())
     }
 
-    /// Sorts the hems by cell, and counts those of each cell.
-    fn position(&mut self, columns: &Columns) {
-        let Self { hems, ends, crowd, .. } = self;
-        let cell = |hem: &Hem| columns.cell(hem.column as usize);
-        hems.sort_unstable_by_key(|hem| {
-            let [x, z] = cell(hem);
-            (z, x, hem.column)
+    /// Sorts the skirt vertices by cell, and counts those of each cell.
+    fn sort_by_cell(&mut self, columns: &Columns) {
+        let Self { skirt_vertices, ends, counts, .. } = self;
+        let cell = |skirt_vertex: &SkirtVertex| columns.cell(skirt_vertex.column as usize);
+        skirt_vertices.sort_unstable_by_key(|skirt_vertex| {
+            let [x, z] = cell(skirt_vertex);
+            (z, x, skirt_vertex.column)
         });
-        reset(ends, hems.len(), [None; 4]);
-        crowd.count(columns.grid.size, hems.iter().map(cell));
+        reset(ends, skirt_vertices.len(), [None; 4]);
+        counts.count(columns.grid.size, skirt_vertices.iter().map(cell));
     }
 
     fn find_cells(&mut self, grid: Grid, positions: &[Vec3]) {
@@ -116,29 +117,32 @@ impl Silhouette {
         refill(&mut self.cells, positions.iter().map(|at| [position(0, at.x), position(1, at.z)]));
     }
 
-    /// Finds how far a triangle reaches from the hems of a box of cells.
-    fn cut(&mut self, columns: &Columns, corners: [[f64; 3]; 3], [xs, zs]: [[usize; 2]; 2]) {
+    /// Extends the ends of the skirt vertices in a box of cells to where a triangle reaches.
+    fn extend_ends(&mut self, columns: &Columns, corners: [[f64; 3]; 3], [xs, zs]: [[usize; 2]; 2]) {
         let (grid, heights) = (columns.grid, columns.heights);
         let [across_x, _, across_z] = [0, 1, 2].map(|axis| {
             let of = corners.map(|corner| corner[axis]);
             of[0].min(of[1]).min(of[2])..=of[0].max(of[1]).max(of[2])
         });
         for z in zs[0]..zs[1] {
-            for number in self.crowd.numbers(xs, z) {
-                let hem = &self.hems[number];
-                let [x, _] = columns.cell(hem.column as usize);
+            for number in self.counts.numbers(xs, z) {
+                let skirt_vertex = &self.skirt_vertices[number];
+                let [x, _] = columns.cell(skirt_vertex.column as usize);
                 let [cx, cz] = grid.centre([x, z]);
-                // Which of the lines through the middle it may cross: those along x, and along z.
+                // Whether the triangle may cross the lines along x and along z through the middle of the cell.
                 let crosses = [across_z.contains(&cz), across_x.contains(&cx)];
                 if crosses == [false; 2] {
                     continue;
                 }
-                let base = heights.low + f64::from(columns.bases()[hem.column as usize]) * heights.unit;
+                let base =
+                    heights.low + f64::from(columns.bases()[skirt_vertex.column as usize]) * heights.unit;
                 let local = corners.map(|[x, y, z]| [(x - cx) / grid.cell, y - base, (z - cz) / grid.cell]);
                 let ends = self.ends[number].iter_mut().enumerate();
-                for (side, end) in ends.filter(|(side, _)| crosses[side % 2] && hem.sides[*side].is_some()) {
+                for (side, end) in
+                    ends.filter(|(side, _)| crosses[side % 2] && skirt_vertex.sides[*side].is_some())
+                {
                     let [dx, dz] = RING[2 * side].map(f64::from);
-                    // Along the side, and across it.
+                    // Coordinates along the direction of the side, up, and across.
                     let line = local.map(|[x, y, z]| [x * dx + z * dz, y, z * dx - x * dz]);
                     let reached = crossing(line).filter(|end| end.height.abs() <= grid.cell);
                     if let Some(reached) = reached
@@ -152,21 +156,22 @@ impl Silhouette {
     }
 }
 
-/// Counts of hems in boxes of cells: a summed-area table.
+/// Counts of skirt vertices in boxes of cells: a summed-area table.
 #[derive(Debug, Default)]
-struct Crowd {
-    /// Hems in the cells that are both west and north of a grid corner, row by row: one more along each axis than there are cells.
+struct CellCounts {
+    /// For each corner of the grid, row by row, the count in the cells that are both west and north of it. There is one corner more along
+    /// each axis than there are cells.
     before: Vec<u32>,
     /// Count of cells along x and z.
     size: [usize; 2],
 }
 
-impl Crowd {
-    fn count(&mut self, [nx, nz]: [usize; 2], hems: impl Iterator<Item = [usize; 2]>) {
+impl CellCounts {
+    fn count(&mut self, [nx, nz]: [usize; 2], skirt_vertices: impl Iterator<Item = [usize; 2]>) {
         let across = nx + 1;
         self.size = [nx, nz];
         reset(&mut self.before, across * (nz + 1), 0);
-        for [x, z] in hems {
+        for [x, z] in skirt_vertices {
             self.before[(z + 1) * across + x + 1] += 1;
         }
         for row in 1..=nz {
@@ -179,16 +184,17 @@ impl Crowd {
         }
     }
 
-    /// Hems of some cells of a row, numbered row by row.
+    /// Range of the skirt vertices of some cells of a row, as they are sorted row by row.
     fn numbers(&self, xs: [usize; 2], row: usize) -> Range<usize> {
         let across = self.size[0] + 1;
         let [above, below] = [row, row + 1].map(|row| &self.before[row * across..][..across]);
-        // All of the rows above, and those of this row before it.
+        // All in the rows before, and those before `x` in this row.
         let [start, end] = xs.map(|x| (above[across - 1] + below[x] - above[x]) as usize);
         start..end
     }
 
-    /// The box of cells (ends exclusive) within a cell of a triangle whose corners are in the given cells, if the box contains hems.
+    /// The bounding box (ends exclusive) of the given cells of a triangle's corners, one cell larger on each side, if it contains skirt
+    /// vertices.
     #[inline]
     fn near(&self, corners: [[i32; 2]; 3]) -> Option<[[usize; 2]; 2]> {
         let [[west, east], [north, south]] = [0, 1].map(|axis| {
@@ -203,22 +209,24 @@ impl Crowd {
     }
 }
 
-/// How far the ground reaches from the middle of a cell (cells), and its height there above the column's base (m).
+/// How far the ground reaches in a direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct End {
+    /// Distance from the middle of the cell (cells).
     at: f64,
+    /// Height above the column's base (m).
     height: f64,
 }
 
 impl End {
-    /// Whether another one is farther, or equally far and higher.
+    /// Whether the other is farther, or equally far and higher.
     fn is_before(&self, other: &Self) -> bool {
         (self.at, self.height) < (other.at, other.height)
     }
 }
 
-/// Where a triangle, with corners along, above and across a line, ends on the line from 0 to 1. None if it does not cross it or is
-/// vertical.
+/// The farthest position on a line, from 0 to at most 1, that a triangle covers; corners are given along the line, above it and across it.
+/// None if the triangle does not cross the line there, or is vertical.
 fn crossing(corners: [[f64; 3]; 3]) -> Option<End> {
     let mut points = [[0.0; 2]; 2];
     let mut count = 0;

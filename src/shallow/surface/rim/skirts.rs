@@ -7,10 +7,10 @@ use super::ledges::Ledges;
 use crate::numeric::lists::reset;
 use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::surface::buffers::vertices::Vertices;
-use crate::shallow::surface::quartets::links::{RING, Scene, cell_at};
+use crate::shallow::surface::quartets::links::{LiquidColumns, RING, cell_at};
 use crate::shallow::surface::quartets::odd::Search;
-use crate::shallow::surface::quartets::strips::{Found, positions, some};
-use crate::shallow::surface::rim::hem::Hem;
+use crate::shallow::surface::quartets::strips::{Found, neighbour, positions};
+use crate::shallow::surface::rim::skirt_vertex::SkirtVertex;
 use crate::shallow::surface::{Indices, Target};
 
 /// The skirts of a surface; reuses its memory.
@@ -18,79 +18,81 @@ use crate::shallow::surface::{Indices, Target};
 pub(in crate::shallow::surface) struct Skirts {
     /// Edges of odd quartets and of full ones beside them, between wet columns, in the direction of their triangles.
     edges: Vec<[u32; 2]>,
-    /// For each column, the directions of such edges from it: a bit per position of the ring of cells around. Reset to 0 between surfaces.
-    ways: Vec<u8>,
-    /// The edges that have a skirt.
+    /// For each column, the directions of such edges that start at it: a bit per position in the ring of cells around. 0 between surfaces.
+    directions: Vec<u8>,
+    /// Edges with a triangle on one side only, which get a skirt.
     open: Vec<[u32; 2]>,
-    /// Hems, in order of their vertices, and the first of these.
-    pub(super) hems: Vec<Hem>,
+    /// In the order in which they are appended to the mesh's vertices.
+    pub(super) skirt_vertices: Vec<SkirtVertex>,
+    /// Number of the first skirt vertex in the mesh.
     first: u32,
-    /// For each column, the position of its hem, or [`NONE`], to which all are reset between surfaces.
+    /// For each column, the position of its skirt vertex, or [`NONE`]. All [`NONE`] between surfaces.
     positions: Vec<u32>,
 }
 
 impl Skirts {
-    /// Finds the edges that have a triangle on one side only; the first hem is vertex `first`. Returns the counts of vertices and indices.
+    /// Finds the edges that have a triangle on one side only. `first` is the number of the first skirt vertex in the mesh. Returns how many
+    /// vertices and indices the skirts add.
     pub fn find(
         &mut self,
-        scene: Scene<'_>,
+        liquid: LiquidColumns<'_>,
         found: &Found,
         search: &Search,
         ledges: Option<&Ledges>,
         first: u32,
     ) -> [usize; 2] {
-        let len = scene.columns.len();
-        self.forget();
+        let len = liquid.columns.len();
+        self.clear();
         self.first = first;
-        let Self { edges, ways, open, hems, positions, .. } = self;
+        let Self { edges, directions, open, skirt_vertices, positions, .. } = self;
         let Some(ledges) = ledges else { return [0; 2] };
-        if ways.len() != len {
-            reset(ways, len, 0);
+        if directions.len() != len {
+            reset(directions, len, 0);
             reset(positions, len, NONE);
         }
-        // For the same count of columns nothing is allocated again: a column has at most eight directions.
-        edges.reserve(8 * ledges.most);
-        open.reserve(ledges.most);
-        hems.reserve(ledges.most);
-        edges_of_full(scene, found, |edge| edges.push(edge));
+        // A column has at most eight directions: for the same count of columns nothing is allocated again.
+        edges.reserve(8 * ledges.max_vertices);
+        open.reserve(ledges.max_vertices);
+        skirt_vertices.reserve(ledges.max_vertices);
+        edges_of_full(liquid, found, |edge| edges.push(edge));
         let is_column = |id: u32| (id as usize) < len;
         for [a, b, c] in search.triangles() {
             edges.extend(
                 [[a, b], [b, c], [c, a]].into_iter().filter(|edge| edge.iter().all(|&end| is_column(end))),
             );
         }
-        edges.retain(|edge| edge.iter().all(|&end| scene.is_wet(end as usize)));
-        let way = |edge: &[u32; 2]| way(scene.columns, *edge).unwrap_or(0);
+        edges.retain(|edge| edge.iter().all(|&end| liquid.is_wet(end as usize)));
+        let direction = |edge: &[u32; 2]| direction(liquid.columns, *edge).unwrap_or(0);
         for edge in edges.iter() {
-            ways[edge[0] as usize] |= 1 << way(edge);
+            directions[edge[0] as usize] |= 1 << direction(edge);
         }
         for edge in edges.iter() {
-            let (at, back) = (way(edge), (way(edge) + 4) % 8);
-            let has = |end: usize, way: u8| ways[edge[end] as usize] >> way & 1 == 1;
-            if !has(0, at) || has(1, back) || !ends_within(scene, *edge, at) {
+            let (at, back) = (direction(edge), (direction(edge) + 4) % 8);
+            let has = |end: usize, direction: u8| directions[edge[end] as usize] >> direction & 1 == 1;
+            if !has(0, at) || has(1, back) || !ends_within(liquid, *edge, at) {
                 continue;
             }
-            // Once, if two triangles have it.
-            ways[edge[0] as usize] &= !(1 << at);
+            // Two triangles may have the same edge: add it once.
+            directions[edge[0] as usize] &= !(1 << at);
             open.push(*edge);
             for (end, side) in edge.iter().zip(sides(at)) {
                 let position = &mut positions[*end as usize];
                 if *position == NONE {
-                    *position = hems.len() as u32;
-                    hems.push(Hem { column: *end, sides: [None; 4], rise: 0.0 });
+                    *position = skirt_vertices.len() as u32;
+                    skirt_vertices.push(SkirtVertex { column: *end, sides: [None; 4], rise: 0.0 });
                 }
-                hems[*position as usize].sides[usize::from(side)] = Some(0.0);
+                skirt_vertices[*position as usize].sides[usize::from(side)] = Some(0.0);
             }
         }
-        edges.iter().for_each(|[from, _]| ways[*from as usize] = 0);
-        hems.iter_mut().for_each(|hem| ledges.reach(hem));
-        [hems.len(), 6 * open.len()]
+        edges.iter().for_each(|[from, _]| directions[*from as usize] = 0);
+        skirt_vertices.iter_mut().for_each(|skirt_vertex| ledges.reach(skirt_vertex));
+        [skirt_vertices.len(), 6 * open.len()]
     }
 
-    /// Writes the hems after all other vertices.
-    pub fn write_hems(&self, vertices: &Vertices<'_>, target: &mut Target<'_>) {
-        for (vertex, hem) in (self.first as usize..).zip(&self.hems) {
-            vertices.put_hem(vertex, hem, target);
+    /// Writes the skirt vertices after all other vertices.
+    pub fn write_vertices(&self, vertices: &Vertices<'_>, target: &mut Target<'_>) {
+        for (vertex, skirt_vertex) in (self.first as usize..).zip(&self.skirt_vertices) {
+            vertices.put_skirt_vertex(vertex, skirt_vertex, target);
         }
     }
 
@@ -116,44 +118,46 @@ impl Skirts {
     }
 
     /// Clears the previous surface.
-    fn forget(&mut self) {
-        self.hems.iter().for_each(|hem| self.positions[hem.column as usize] = NONE);
+    fn clear(&mut self) {
+        self.skirt_vertices
+            .iter()
+            .for_each(|skirt_vertex| self.positions[skirt_vertex.column as usize] = NONE);
         self.edges.clear();
         self.open.clear();
-        self.hems.clear();
+        self.skirt_vertices.clear();
     }
 }
 
-/// Position, in the ring of cells around a column, of another column.
-fn way(columns: &Columns, [from, to]: [u32; 2]) -> Option<u8> {
+/// Direction of an edge: the position of its end in the ring of cells around its start.
+fn direction(columns: &Columns, [from, to]: [u32; 2]) -> Option<u8> {
     if from == NONE || to == NONE {
         return None;
     }
     let [from, to] = [from, to].map(|column| columns.cell(column as usize));
-    RING.iter().position(|&step| cell_at(from, step) == to).map(|way| way as u8)
+    RING.iter().position(|&step| cell_at(from, step) == to).map(|position| position as u8)
 }
 
-/// The side to the right of a step between two columns, for each of them: nothing is there. For a diagonal step it is the corner between
-/// both.
-fn sides(way: u8) -> [u8; 2] {
-    let turns = if way.is_multiple_of(2) { [6, 6] } else { [7, 5] };
-    turns.map(|turn| (way + turn) % 8 / 2)
+/// The side of each of two columns that lies to the right of the edge between them, where the surface is open. For a diagonal edge these
+/// are the two sides that meet at the corner.
+fn sides(direction: u8) -> [u8; 2] {
+    let turns = if direction.is_multiple_of(2) { [6, 6] } else { [7, 5] };
+    turns.map(|turn| (direction + turn) % 8 / 2)
 }
 
 /// Whether the cells to the right of an edge are in the domain: at its border the surface ends without a skirt.
-fn ends_within(scene: Scene<'_>, edge: [u32; 2], way: u8) -> bool {
-    let [nx, nz] = scene.columns.grid.size;
-    edge.iter().zip(sides(way)).all(|(end, side)| {
-        let [x, z] = cell_at(scene.columns.cell(*end as usize), RING[usize::from(2 * side)]);
+fn ends_within(liquid: LiquidColumns<'_>, edge: [u32; 2], direction: u8) -> bool {
+    let [nx, nz] = liquid.columns.grid.size;
+    edge.iter().zip(sides(direction)).all(|(end, side)| {
+        let [x, z] = cell_at(liquid.columns.cell(*end as usize), RING[usize::from(2 * side)]);
         x < nx && z < nz
     })
 }
 
 /// Calls `add` with the edges of full quartets beside quartets of the same layer that were searched and are not full.
-fn edges_of_full(scene: Scene<'_>, found: &Found, mut add: impl FnMut([u32; 2])) {
-    let columns = scene.columns;
+fn edges_of_full(liquid: LiquidColumns<'_>, found: &Found, mut add: impl FnMut([u32; 2])) {
+    let columns = liquid.columns;
     let full = |strip: Option<usize>| strip.map_or(0, |strip| found.states[strip].full);
-    // A column at a position of a strip, or the first one of the strip to the east.
+    // The column at a position of a strip; a position of 16 is the first one of the strip to the east.
     let at = |strip: usize, position: usize| match position {
         STRIP => columns.east(strip).map(|east| (east * STRIP) as u32),
         _ => Some((strip * STRIP + position) as u32),
@@ -167,21 +171,21 @@ fn edges_of_full(scene: Scene<'_>, found: &Found, mut add: impl FnMut([u32; 2]))
         let searched = found.blocks[block].searched;
         let (row, along) = (block / found.across, block % found.across);
         let layers =
-            |row: usize| std::iter::successors(scene.lowest([row, along]), |&strip| scene.above(strip));
+            |row: usize| std::iter::successors(liquid.lowest([row, along]), |&strip| liquid.above(strip));
         // To the north of a quartet, and to its south.
         for strip in row.checked_sub(1).into_iter().flat_map(layers) {
-            let edge = some(columns.south(strip));
+            let edge = neighbour(columns.south(strip));
             for position in positions(full(Some(strip)) & searched & !full(edge)) {
                 join(edge.and_then(|edge| at(edge, position)), edge.and_then(|edge| at(edge, position + 1)));
             }
         }
         for strip in layers(row + 1) {
-            for position in positions(full(Some(strip)) & searched & !full(some(columns.north(strip)))) {
+            for position in positions(full(Some(strip)) & searched & !full(neighbour(columns.north(strip)))) {
                 join(at(strip, position + 1), at(strip, position));
             }
         }
         for strip in layers(row) {
-            let (own, south) = (full(Some(strip)), some(columns.south(strip)));
+            let (own, south) = (full(Some(strip)), neighbour(columns.south(strip)));
             let west = own << 1 | full(columns.west(strip)) >> 15;
             for position in positions(west & searched & !own) {
                 join(south.and_then(|south| at(south, position)), at(strip, position));
@@ -191,13 +195,13 @@ fn edges_of_full(scene: Scene<'_>, found: &Found, mut add: impl FnMut([u32; 2]))
                 join(at(strip, position + 1), south.and_then(|south| at(south, position + 1)));
             }
         }
-        // Over the block's east side, where there may be no strip of the layer in it.
+        // Full quartets to the east of the block, on layers that the block itself may lack.
         if searched >> 15 == 1 {
-            let layers = std::iter::successors(scene.lowest([row, along + 1]), |&strip| scene.above(strip));
+            let layers = std::iter::successors(liquid.lowest([row, along + 1]), |&strip| liquid.above(strip));
             for strip in
                 layers.filter(|&strip| full(Some(strip)) & 1 & !(full(columns.west(strip)) >> 15) == 1)
             {
-                join(at(strip, 0), some(columns.south(strip)).and_then(|south| at(south, 0)));
+                join(at(strip, 0), neighbour(columns.south(strip)).and_then(|south| at(south, 0)));
             }
         }
     }

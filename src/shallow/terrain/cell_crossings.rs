@@ -1,4 +1,4 @@
-//! Crossings of lines, cell by cell, and the solids between them.
+//! Crossings of the vertical lines of cells with triangles, and the solids between them.
 
 use super::solids::Solid;
 use crate::numeric::lists::reset;
@@ -6,7 +6,7 @@ use crate::shallow::columns::grid::BOTTOMLESS;
 
 /// The crossings of the lines of a box of cells: height (units) x 2, plus 1 if the triangle faces up.
 #[derive(Debug, Default)]
-pub(super) struct Piles {
+pub(super) struct CellCrossings {
     /// Cell and crossing, in any order.
     crossings: Vec<[u32; 2]>,
     /// For each cell, and one after the last: count of its crossings, then where they begin in `sorted`, then where they end.
@@ -15,7 +15,7 @@ pub(super) struct Piles {
     sorted: Vec<u32>,
 }
 
-impl Piles {
+impl CellCrossings {
     /// Clears the crossings, for this many cells.
     pub fn reset(&mut self, cells: usize) {
         self.crossings.clear();
@@ -35,7 +35,7 @@ impl Piles {
     }
 
     /// Sorts the crossings of each cell and makes solids of them; `starts` gets where each cell's solids begin, and the end of the last.
-    pub fn stack(&mut self, starts: &mut Vec<u32>, solids: &mut Vec<Solid>) {
+    pub fn find_solids(&mut self, starts: &mut Vec<u32>, solids: &mut Vec<Solid>) {
         let Self { crossings, ends, sorted } = self;
         let mut next = 0;
         for end in ends.iter_mut() {
@@ -51,10 +51,10 @@ impl Piles {
         let mut rest = &mut sorted[..];
         let mut begin = 0;
         for &end in ends.iter() {
-            let (line, behind) = rest.split_at_mut((end - begin) as usize);
-            (rest, begin) = (behind, end);
+            let (line, others) = rest.split_at_mut((end - begin) as usize);
+            (rest, begin) = (others, end);
             line.sort_unstable();
-            pile(line, solids);
+            add_solids(line, solids);
             starts.push(solids.len() as u32);
         }
     }
@@ -68,23 +68,24 @@ impl Piles {
         [sizes[0], sizes[1], sizes[2], positions[0], positions[1], positions[2]]
     }
 
-    /// Reserves memory for half as many crossings again: frames that find a few more allocate nothing.
-    pub fn keep_room(&mut self) {
-        keep_room(&mut self.crossings);
-        keep_room(&mut self.sorted);
+    /// Reserves memory for half as many crossings again, so that frames with a few more allocate nothing.
+    pub fn reserve_half_more(&mut self) {
+        reserve_half_more(&mut self.crossings);
+        reserve_half_more(&mut self.sorted);
     }
 }
 
-/// Adds the solids of one line, whose crossings ascend.
-fn pile(line: &[u32], solids: &mut Vec<Solid>) {
+/// Adds the solids of one line, given its crossings in ascending order. From the top down, the line is solid where the winding number is
+/// above 0.
+fn add_solids(line: &[u32], solids: &mut Vec<Solid>) {
     let first = solids.len();
     let (mut winding, mut top) = (0, 0);
     let mut is_solid = false;
-    let mut above = line.iter().rev().peekable();
-    while let Some(crossing) = above.next() {
+    let mut downward = line.iter().rev().peekable();
+    while let Some(crossing) = downward.next() {
         winding += ((crossing & 1) << 1) as i32 - 1;
         // Changes at the same height are summed.
-        if above.peek().is_some_and(|next| *next >> 1 == crossing >> 1) || is_solid == (winding > 0) {
+        if downward.peek().is_some_and(|next| *next >> 1 == crossing >> 1) || is_solid == (winding > 0) {
             continue;
         }
         is_solid = !is_solid;
@@ -102,7 +103,7 @@ fn pile(line: &[u32], solids: &mut Vec<Solid>) {
 }
 
 /// Reserves memory for half as much again.
-pub(super) fn keep_room<T>(buffer: &mut Vec<T>) {
+pub(super) fn reserve_half_more<T>(buffer: &mut Vec<T>) {
     let wanted = buffer.len() + buffer.len() / 2;
     if buffer.capacity() < wanted {
         buffer.reserve_exact(wanted - buffer.len());

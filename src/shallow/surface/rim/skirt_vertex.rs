@@ -1,17 +1,17 @@
-//! The rim of a column at which films end.
+//! Vertices at the lower edge of skirts.
 
-/// Where the surface of a column ends.
+/// Where the surface of a column comes down to the ground's edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::shallow::surface) struct Hem {
+pub(in crate::shallow::surface) struct SkirtVertex {
     /// Index of the column.
     pub column: u32,
-    /// For east, north, west and south: how far the ground reaches (cells) where the surface ends there.
+    /// East, north, west and south, where the surface ends on that side: how far the ground reaches from the middle of the cell (cells).
     pub sides: [Option<f32>; 4],
-    /// How much higher the ground is there than the column's base (m).
+    /// Height of the ground's edge above the column's base (m).
     pub rise: f32,
 }
 
-impl Hem {
+impl SkirtVertex {
     /// Offset from the middle of the cell along x and z (cells).
     pub fn offset(&self) -> [f32; 2] {
         let [east, north, west, south] = self.sides.map(|reach| reach.unwrap_or(0.0));
