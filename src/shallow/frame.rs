@@ -148,7 +148,7 @@ impl Shallow {
         let mut saved = std::mem::take(&mut self.rollback);
         // The maximum size: it is not reserved again when the liquid spreads.
         saved.state.clear();
-        saved.state.reserve(self.most_save_size());
+        saved.state.reserve(self.max_save_size());
         self.save_into(&mut saved.state);
         saved.steps.clone_from(&self.steps);
         self.rollback = saved;

@@ -75,7 +75,7 @@ impl Shallow {
             end == Outcome::Flies
         });
         self.flow.links.lost += lost;
-        self.flow.amounts.count_in(Account::Lost, &gone);
+        self.flow.amounts.add_to_account(Account::Lost, &gone);
         self.falls.packets = packets;
         self.land_all(landed);
     }
@@ -112,7 +112,7 @@ impl Shallow {
         let added = flow.change_depth(columns, column, units);
         let mut own = [0; MAX_SCALARS];
         take(&mut amounts, added, units, &mut own);
-        flow.amounts.put(column, &own);
+        flow.amounts.add_amounts(column, &own);
         let cell = columns.grid.index(columns.cell(column));
         self.remap.held.add(cell, columns.bases()[column], units - added, amounts);
         added < units
@@ -192,7 +192,7 @@ impl Shallow {
                 Outcome::Flies => {}
                 Outcome::Leaves => {
                     self.flow.links.lost += waiting.units;
-                    self.flow.amounts.count_in(Account::Lost, &waiting.amounts);
+                    self.flow.amounts.add_to_account(Account::Lost, &waiting.amounts);
                 }
                 Outcome::Lands(column) => {
                     let (column, units, amounts) = (column as u32, waiting.units, waiting.amounts);

@@ -1,10 +1,10 @@
 //! Forces of the liquid on the bodies in it, pressure and drag, for haptic tools; and the volume that the bodies displace.
 //!
 //! A body is a pillar in each cell that it covers (`terrain/shapes.rs`). Its faces are where liquid touches pillars: below, above, and at
-//! the sides, where the pillar of one cell and the liquid of the next are at the same height. On a face acts the weight of the liquid above
-//! it, rho g (eta - y), integrated exactly over the pillar, with the head of a flooded column instead of eta; a submerged ball has the
-//! buoyancy of its pillars. On a face that the liquid runs into acts the stagnation pressure, rho w^2 / 2, and along each face the shear of
-//! a film, of a flooded gap, or of a wall half a cell away.
+//! the sides, where the pillar of one cell and the liquid of the next are at the same height. The weight of the liquid above a face acts on
+//! it: rho g (eta - y), integrated exactly over the pillar, with the head of a flooded column instead of eta. A submerged ball has the
+//! buoyancy of its pillars. The stagnation pressure, rho w^2 / 2, acts on faces that the liquid runs into, and shear acts along all faces:
+//! of a film, of a flooded gap, or of a wall half a cell away.
 
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
@@ -17,7 +17,7 @@ use crate::shallow::system::Shallow;
 use crate::shallow::terrain::shapes::Shape;
 
 /// Minimum height, for drag, of a flooded gap (cells): some pillars of a round body come arbitrarily close to the ground.
-const LEAST_GAP: f64 = 0.05;
+const MIN_GAP: f64 = 0.05;
 
 /// The load on a body.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -28,15 +28,15 @@ pub struct Load {
     pub drag: [f64; 3],
     /// Torque of both about the body's middle (N m).
     pub torque: [f64; 3],
-    /// Volume of the body below the liquid's surface (m3), which is that of a flooded column below, else the mean of the surface at its
+    /// Volume of the body below the liquid's surface (m3). The surface is that of the flooded column below, else the mean at the body's
     /// sides.
     pub displaced: f64,
     /// Area of the faces of its pillars that touch liquid (m2).
     pub wetted: f64,
 }
 
-/// Sums for a body while its faces are processed.
-struct Feeling<'a> {
+/// Sums over the faces of a body.
+struct FaceSums<'a> {
     liquid: &'a Shallow,
     density: f64,
     velocity: DVec3,
@@ -45,17 +45,22 @@ struct Feeling<'a> {
     drag: DVec3,
     torque: DVec3,
     wetted: f64,
-    /// Units at its sides: of contact, and of contact times the surface and times the base.
+    /// Height of its sides that touches liquid (units), summed.
     contact: f64,
+    /// The same, weighted by the level of the liquid and by the base of its column.
     levels: f64,
     bases: f64,
 }
 
-/// A face: its middle, how far below that the weight of the liquid acts (m), the direction in which the liquid pushes it, and its area.
+/// A face of a pillar.
 struct Face {
+    /// Its middle (m).
     at: DVec3,
+    /// How far below its middle the pressure acts (m).
     lower: f64,
+    /// Direction in which the liquid pushes it.
     push: DVec3,
+    /// Its area (m2).
     area: f64,
 }
 
@@ -83,7 +88,7 @@ impl Shallow {
 
     fn load(&self, body: &Shape, density: f64, velocity: DVec3) -> Load {
         let Columns { grid, heights, .. } = &self.columns;
-        let mut feeling = Feeling {
+        let mut sums = FaceSums {
             liquid: self,
             density,
             velocity,
@@ -96,16 +101,16 @@ impl Shallow {
             levels: 0.0,
             bases: 0.0,
         };
-        body.each_cell(grid, heights, |cell, solid| feeling.pillar(cell, solid));
-        let around = [feeling.levels, feeling.bases].map(|sum| sum / feeling.contact);
+        body.each_cell(grid, heights, |cell, solid| sums.pillar(cell, solid));
+        let around = [sums.levels, sums.bases].map(|sum| sum / sums.contact);
         let mut units = 0.0;
-        body.each_cell(grid, heights, |cell, solid| units += self.under(cell, solid, around));
+        body.each_cell(grid, heights, |cell, solid| units += self.submerged(cell, solid, around));
         Load {
-            pressure: feeling.pressure.into(),
-            drag: feeling.drag.into(),
-            torque: feeling.torque.into(),
+            pressure: sums.pressure.into(),
+            drag: sums.drag.into(),
+            torque: sums.torque.into(),
             displaced: units * grid.cell * grid.cell * heights.unit,
-            wetted: feeling.wetted,
+            wetted: sums.wetted,
         }
     }
 
@@ -124,8 +129,8 @@ impl Shallow {
         ends
     }
 
-    /// The height (units) at which the liquid of a column stands, or would without a ceiling; none if it is dry.
-    fn stands(&self, column: usize) -> Option<f64> {
+    /// The level of a column's liquid (units): its surface, or where it would be without the ceiling; none if it is dry.
+    fn level(&self, column: usize) -> Option<f64> {
         let depth = self.flow.depth[column];
         let eta = f64::from(self.columns.bases()[column]) + f64::from(depth);
         (depth > 0).then(|| eta + f64::from(self.flow.network.over()[column].max(0.0)))
@@ -138,20 +143,20 @@ impl Shallow {
     }
 
     /// The mean velocity of a column (m/s).
-    fn stream(&self, column: usize) -> DVec3 {
+    fn mean_velocity(&self, column: usize) -> DVec3 {
         let [u, w] = self.velocity(column).map(f64::from);
         DVec3::new(u, 0.0, w)
     }
 
     /// Height of a pillar below the surface (units); `level` and `ground` are the surface and the ground at the sides of the body.
-    fn under(&self, cell: [usize; 2], [bottom, top]: [i32; 2], [level, ground]: [f64; 2]) -> f64 {
+    fn submerged(&self, cell: [usize; 2], [bottom, top]: [i32; 2], [level, ground]: [f64; 2]) -> f64 {
         let [below, above] = self.ends(cell, [bottom, top]);
         let (bottom, top) = (f64::from(bottom), f64::from(top));
         let is_covered = above.is_some_and(|above| self.flow.depth[above] > 0);
         let level = match below {
-            // Liquid that was pushed up onto a body that stands out of the liquid does not mean that the body is submerged.
+            // Liquid that was pushed up onto a body does not submerge it.
             _ if is_covered => level,
-            Some(below) => self.stands(below).filter(|_| self.is_full(below)).unwrap_or(f64::NAN),
+            Some(below) => self.level(below).filter(|_| self.is_full(below)).unwrap_or(f64::NAN),
             None => level,
         };
         let bottom = if below.is_some() { bottom } else { bottom.max(ground) };
@@ -160,7 +165,7 @@ impl Shallow {
     }
 }
 
-impl Feeling<'_> {
+impl FaceSums<'_> {
     /// Adds the loads on the faces of a pillar.
     fn pillar(&mut self, cell: [usize; 2], [bottom, top]: [i32; 2]) {
         let Columns { grid, heights, .. } = &self.liquid.columns;
@@ -174,15 +179,15 @@ impl Feeling<'_> {
             area,
         };
         // Between a film and the body above it there is air.
-        if let Some((column, level)) = self.stands(below.filter(|&below| self.liquid.is_full(below))) {
+        if let Some((column, level)) = self.level(below.filter(|&below| self.liquid.is_full(below))) {
             // A flooded gap: the flow through it, and what the body drags along.
-            let sheared = 6.0 * self.liquid.stream(column) - self.velocity;
-            let shear = 1.0 / depth(column).max(LEAST_GAP * grid.cell);
+            let sheared = 6.0 * self.liquid.mean_velocity(column) - self.velocity;
+            let shear = 1.0 / depth(column).max(MIN_GAP * grid.cell);
             self.face(&face(bottom, 1.0), level - f64::from(bottom), column, sheared * shear);
         }
-        if let Some((column, level)) = self.stands(above) {
+        if let Some((column, level)) = self.level(above) {
             // A film. If thinner than a cell it moves with the body, more so the thinner it is.
-            let sheared = 3.0 * (self.liquid.stream(column) - self.velocity);
+            let sheared = 3.0 * (self.liquid.mean_velocity(column) - self.velocity);
             let thick = depth(column);
             let shear = if thick < grid.cell { thick / (grid.cell * grid.cell) } else { 1.0 / thick };
             self.face(&face(top, -1.0), level - f64::from(top), column, sheared * shear);
@@ -194,10 +199,10 @@ impl Feeling<'_> {
         }
     }
 
-    /// A column with liquid, and the height at which it stands (units).
-    fn stands(&self, column: Option<usize>) -> Option<(usize, f64)> {
+    /// A column with liquid, and its level (units).
+    fn level(&self, column: Option<usize>) -> Option<(usize, f64)> {
         let column = column?;
-        Some((column, self.liquid.stands(column)?))
+        Some((column, self.liquid.level(column)?))
     }
 
     /// Adds the load of the liquid in an adjacent cell.
@@ -206,7 +211,7 @@ impl Feeling<'_> {
         let out = [0, 1].map(|axis| beside[axis] as f64 - cell[axis] as f64);
         let [x, z] = grid.centre(cell);
         for column in columns.of_cell(beside) {
-            let Some(level) = self.liquid.stands(column) else { continue };
+            let Some(level) = self.liquid.level(column) else { continue };
             let base = columns.bases()[column];
             let low = solid[0].max(base);
             let high = solid[1].min(base + self.liquid.flow.depth[column]);
@@ -221,22 +226,21 @@ impl Feeling<'_> {
             let half = 0.5 * grid.cell;
             let face = Face {
                 at: DVec3::new(x + half * out[0], height, z + half * out[1]),
-                // The moment of a pressure that grows downward.
+                // Centre of a pressure that grows downward.
                 lower: columns.heights.length(contact * contact / (12.0 * (level - middle))),
                 push: DVec3::new(-out[0], 0.0, -out[1]),
                 area: columns.heights.length(contact) * grid.cell,
             };
-            let sheared = (self.liquid.stream(column) - self.velocity) * (2.0 / grid.cell);
+            let sheared = (self.liquid.mean_velocity(column) - self.velocity) * (2.0 / grid.cell);
             self.face(&face, level - middle, column, sheared);
         }
     }
 
-    /// Adds the load of a column on a face that lies `head` (units) below the height at which the column stands; `sheared` is the shear
-    /// rate along it (1/s).
+    /// Adds the load of a column on a face that lies `head` (units) below the column's level; `sheared` is the shear rate along it (1/s).
     fn face(&mut self, face: &Face, head: f64, column: usize, sheared: DVec3) {
         let liquid = self.liquid;
         let weight = -liquid.params.gravity[1] * liquid.columns.heights.length(head);
-        let into = (liquid.stream(column) - self.velocity).dot(&face.push);
+        let into = (liquid.mean_velocity(column) - self.velocity).dot(&face.push);
         let stagnant = if into > 0.0 { 0.5 * into * into } else { 0.0 };
         let along = sheared - face.push * sheared.dot(&face.push);
         let friction = along * liquid.params.liquid.viscosity_at(along.norm());

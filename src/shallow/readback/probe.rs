@@ -1,4 +1,4 @@
-//! Read-back: how much liquid is in a box or on a layer, and how deep and fast it is at a point.
+//! Probes: how much liquid is in a box or on a layer, and how deep and fast it is at a point.
 
 use std::ops::Range;
 
@@ -22,8 +22,8 @@ pub struct View<'a> {
 /// Where velocities and concentrations come from.
 #[derive(Clone, Copy)]
 enum Source<'a> {
-    Taken(&'a Snapshot),
-    Now(&'a Shallow),
+    Snapshot(&'a Snapshot),
+    Live(&'a Shallow),
 }
 
 /// The liquid in a column.
@@ -47,14 +47,14 @@ impl Shallow {
     /// The current liquid, for reading.
     pub fn view(&self) -> View<'_> {
         let (columns, depth, active) = (&self.columns, self.flow.depths(), self.flow.active());
-        View { columns, depth, active, source: Source::Now(self) }
+        View { columns, depth, active, source: Source::Live(self) }
     }
 }
 
 impl Snapshot {
     /// The liquid of the snapshot, for reading.
     pub fn view(&self) -> View<'_> {
-        let source = Source::Taken(self);
+        let source = Source::Snapshot(self);
         View { columns: self.columns(), depth: self.depths(), active: self.active(), source }
     }
 }
@@ -120,11 +120,11 @@ impl View<'_> {
         let heights = &self.columns.heights;
         let cell = self.columns.grid.cell_at([x, z]).filter(|_| !y.is_nan())?;
         let y = heights.round(y);
-        let off = |index: &usize| {
+        let distance = |index: &usize| {
             let (base, ceiling) = (self.columns.bases()[*index], self.columns.ceilings()[*index]);
             (base - y).max(y - ceiling).max(0)
         };
-        let column = self.columns.of_cell(cell).min_by_key(off)?;
+        let column = self.columns.of_cell(cell).min_by_key(distance)?;
         let (base, depth) = (self.columns.bases()[column], self.depth[column]);
         let velocity = self.velocity(column);
         Some(Reading {
@@ -149,25 +149,25 @@ impl View<'_> {
 
     fn velocity(&self, column: usize) -> [f32; 2] {
         match self.source {
-            Source::Taken(snapshot) => snapshot.velocities()[column],
-            Source::Now(shallow) => shallow.velocity(column),
+            Source::Snapshot(snapshot) => snapshot.velocities()[column],
+            Source::Live(shallow) => shallow.velocity(column),
         }
     }
 
     fn scalars(&self) -> usize {
         match self.source {
-            Source::Taken(snapshot) => {
+            Source::Snapshot(snapshot) => {
                 (0..).take_while(|&at| !snapshot.concentrations(at).is_empty()).count()
             }
-            Source::Now(shallow) => shallow.scalars().len(),
+            Source::Live(shallow) => shallow.scalars().len(),
         }
     }
 
     /// The concentration of an existing scalar in a column.
     fn concentration(&self, scalar: usize, column: usize) -> f32 {
         match self.source {
-            Source::Taken(snapshot) => snapshot.concentrations(scalar)[column],
-            Source::Now(shallow) => shallow.concentration(scalar, column),
+            Source::Snapshot(snapshot) => snapshot.concentrations(scalar)[column],
+            Source::Live(shallow) => shallow.concentration(scalar, column),
         }
     }
 
@@ -183,10 +183,10 @@ impl View<'_> {
         units
     }
 
-    /// Calls `see` with the columns of a box in active strips, and the units of each that lie in it. Heights of the box are rounded to
+    /// Calls `visit` with the columns of a box in active strips, and the units of each that lie in it. Heights of the box are rounded to
     /// units.
     #[inline(always)]
-    fn each_within(&self, low: [f64; 3], high: [f64; 3], mut see: impl FnMut(usize, i64)) {
+    fn each_within(&self, low: [f64; 3], high: [f64; 3], mut visit: impl FnMut(usize, i64)) {
         let columns = self.columns;
         let [across, rows] = [0, 2].map(|axis| cells(&columns.grid, axis / 2, low[axis], high[axis]));
         let [floor, top] = [low[1], high[1]].map(|height| columns.heights.round(height));
@@ -196,7 +196,7 @@ impl View<'_> {
             let own = strip * STRIP + from..strip * STRIP + to;
             let ends = columns.bases()[own.clone()].iter().zip(&self.depth[own.clone()]);
             for (column, (base, depth)) in own.zip(ends) {
-                see(column, i64::from(((base + depth).min(top) - (*base).max(floor)).max(0)));
+                visit(column, i64::from(((base + depth).min(top) - (*base).max(floor)).max(0)));
             }
         }
     }
@@ -220,7 +220,7 @@ fn sum(depth: &[i32; STRIP]) -> i64 {
 }
 
 fn check_box(low: [f64; 3], high: [f64; 3]) -> Result<()> {
-    // Also where one is NaN.
+    // Also fails if a number is NaN.
     let has_inside = low.iter().zip(&high).all(|(low, high)| low <= high);
     ensure(has_inside, format_args!("a box from {low:?} to {high:?} m has no inside"))
 }

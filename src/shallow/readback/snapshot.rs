@@ -48,8 +48,8 @@ impl Snapshot {
         snapshot
     }
 
-    /// Replaces the contents by the current liquid: the strips that have or had liquid, and the columns where the terrain has
-    /// changed. Allocates nothing, unless these are more than ever before; it may be another liquid.
+    /// Replaces the contents by the current liquid, which may be another one. Copies only strips that have or had liquid, and the columns
+    /// if the terrain has changed. Allocates nothing, unless there are more columns than ever before.
     pub fn take(&mut self, shallow: &Shallow) {
         if self.terrain != shallow.identity.number {
             self.terrain = shallow.identity.number;
@@ -99,7 +99,7 @@ impl Snapshot {
         &self.columns
     }
 
-    /// H of every column index (units).
+    /// Depth of every column index (units).
     pub fn depths(&self) -> &[i32] {
         &self.depth
     }
@@ -154,7 +154,7 @@ fn find_velocities(shallow: &Shallow, run: Range<usize>, out: &mut [[f32; 2]]) {
 
     #[inline(always)]
     fn body(columns: &Columns, flow: &Flow, run: Range<usize>, out: &mut [[f32; 2]]) {
-        // As for one column: the mean of the fluxes on both sides.
+        // As for a single column: the mean of the fluxes on both sides.
         let scale = (0.5 * columns.grid.cell / flow.last) as f32;
         let [east, south] = [&flow.flux[0], &flow.flux[1]].map(|numbers| numbers.as_chunks::<STRIP>().0);
         let depth = flow.depth.as_chunks::<STRIP>().0;
@@ -170,7 +170,7 @@ fn find_velocities(shallow: &Shallow, run: Range<usize>, out: &mut [[f32; 2]]) {
                 let depth = depth[strip][position];
                 let each = if depth > 0 { scale / depth as f32 } else { 0.0 };
                 // Adding 0 removes the sign of -0, so that the result is the same seen from the other side.
-                let mean = |before: f32, behind: f32| (behind + before) * each + 0.0;
+                let mean = |before: f32, after: f32| (after + before) * each + 0.0;
                 out[position] = [
                     mean(west[position], east[strip][position]),
                     mean(north[position], south[strip][position]),

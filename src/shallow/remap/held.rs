@@ -152,10 +152,10 @@ impl Held {
             let falls = parcel.units > 0 && is_void(columns, parcel.cell, parcel.height);
             if falls {
                 fallen += parcel.units;
-                flow.amounts.count_in(Account::Lost, &parcel.amounts);
+                flow.amounts.add_to_account(Account::Lost, &parcel.amounts);
             } else if parcel.units == 0 {
                 // What rounding removed from the shares of adjacent cells.
-                flow.amounts.count_in(Account::Dried, &parcel.amounts);
+                flow.amounts.add_to_account(Account::Dried, &parcel.amounts);
             }
             parcel.units > 0 && !falls
         });
@@ -268,7 +268,7 @@ fn put(columns: &Columns, flow: &mut Flow, order: &mut Vec<u32>, parcel: &mut Pa
             let mut amounts = [0; MAX_SCALARS];
             take(&mut parcel.amounts, units, parcel.units, &mut amounts);
             parcel.units -= units;
-            flow.amounts.put(column, &amounts);
+            flow.amounts.add_amounts(column, &amounts);
         }
     }
 }

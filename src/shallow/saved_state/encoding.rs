@@ -8,10 +8,10 @@ use xxhash_rust::xxh3::xxh3_128;
 use crate::error::{Error, Result};
 use crate::numeric::bytes::Reader;
 
-/// The bytes still to be written.
-pub(super) struct Put<'a>(pub(super) &'a mut [u8]);
+/// Writes into the rest of a slice.
+pub(super) struct Writer<'a>(pub(super) &'a mut [u8]);
 
-impl Put<'_> {
+impl Writer<'_> {
     pub fn bytes(&mut self, bytes: &[u8]) {
         self.next(bytes.len()).copy_from_slice(bytes);
     }
@@ -21,6 +21,7 @@ impl Put<'_> {
         to.iter_mut().zip(numbers).for_each(|(to, number)| *to = bytes(*number));
     }
 
+    /// Skips the next bytes and returns them.
     pub fn next(&mut self, count: usize) -> &mut [u8] {
         let (next, rest) = std::mem::take(&mut self.0).split_at_mut(count);
         self.0 = rest;
@@ -28,39 +29,40 @@ impl Put<'_> {
     }
 }
 
+/// Converts bytes to numbers.
 pub(super) fn get<T, const N: usize>(bytes: &[u8], to: &mut [T], number: impl Fn([u8; N]) -> T) {
     to.iter_mut().zip(bytes.as_chunks().0).for_each(|(to, bytes)| *to = number(*bytes));
 }
 
-/// The next elements of N bytes.
+/// Reads `count` elements of N bytes.
 pub(super) fn parts<'a, const N: usize>(from: &mut Reader<'a>, count: usize) -> Result<&'a [[u8; N]]> {
     Ok(from.bytes(count * N)?.as_chunks().0)
 }
 
-/// Some bytes of an element.
+/// N bytes of an element.
 pub(super) fn part<const N: usize>(element: &[u8], at: usize) -> [u8; N] {
     std::array::from_fn(|byte| element[at + byte])
 }
 
 /// Bytes of the hash at the end of a state.
-pub(super) const SEAL: usize = 16;
+pub(super) const CHECKSUM: usize = 16;
 
-/// How a kind of state begins.
-pub(super) struct Beginning {
+/// What identifies a kind of state.
+pub(super) struct Format {
     pub magic: [u8; 8],
     pub version: u32,
-    /// Where the header has the length of the state.
+    /// Position of the state's length in the header.
     pub length_at: usize,
-    /// What states of this kind are of.
+    /// What is saved, for errors.
     pub of: &'static str,
 }
 
-/// Checks the beginning, the length and the hash of a state; returns its header, and all of it without the hash.
+/// Checks the format, the length and the hash of a state; returns its header, and all of it without the hash.
 pub(super) fn open<'a, const HEADER: usize>(
     bytes: &'a [u8],
-    kind: &Beginning,
+    kind: &Format,
 ) -> Result<(&'a [u8; HEADER], &'a [u8])> {
-    let Beginning { magic, version: wanted, length_at, of } = kind;
+    let Format { magic, version: wanted, length_at, of } = kind;
     let Some(header) = bytes.first_chunk::<HEADER>().filter(|header| header.starts_with(magic)) else {
         let is_begun = bytes.len() < HEADER && bytes.starts_with(magic);
         return Err(if is_begun { refused("is cut short") } else { refused(&format!("is not of {of}")) });
@@ -69,15 +71,15 @@ pub(super) fn open<'a, const HEADER: usize>(
     require(version == *wanted, format_args!("has format {version}, and this library reads {wanted}"))?;
     let length = u64::from_le_bytes(part(header, *length_at));
     require(length <= bytes.len() as u64, "is cut short")?;
-    let (body, seal) = bytes.split_at(bytes.len() - SEAL);
-    require(length >= bytes.len() as u64 && xxh3_128(body).to_le_bytes() == *seal, "is damaged")?;
+    let (body, checksum) = bytes.split_at(bytes.len() - CHECKSUM);
+    require(length >= bytes.len() as u64 && xxh3_128(body).to_le_bytes() == *checksum, "is damaged")?;
     Ok((header, body))
 }
 
 /// Writes the hash of a state at its end.
-pub(super) fn seal(state: &mut [u8]) {
-    let (body, seal) = state.split_at_mut(state.len() - SEAL);
-    seal.copy_from_slice(&xxh3_128(body).to_le_bytes());
+pub(super) fn write_checksum(state: &mut [u8]) {
+    let (body, checksum) = state.split_at_mut(state.len() - CHECKSUM);
+    checksum.copy_from_slice(&xxh3_128(body).to_le_bytes());
 }
 
 pub(super) fn refused(what: &str) -> Error {
@@ -89,5 +91,5 @@ pub(super) fn require(holds: bool, wrong: impl Display) -> Result<()> {
     if holds { Ok(()) } else { Err(refused(&wrong.to_string())) }
 }
 
-/// Valid sums of units, three of which fit 64 bits; and units that a flow point has pending.
+/// Valid range of sums of units: three of them fit 64 bits.
 pub(super) const SUMS: RangeInclusive<i64> = -(1 << 61)..=1 << 61;

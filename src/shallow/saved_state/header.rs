@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::encoding::{Beginning, Put, SEAL};
+use super::encoding::{CHECKSUM, Format, Writer};
 use crate::error::Result;
 use crate::numeric::bytes::Reader;
 use crate::shallow::columns::STRIP;
@@ -11,13 +11,13 @@ use crate::shallow::free_fall::{PACKET_BYTES, WAITING_BYTES};
 use crate::shallow::scalars::amounts::ACCOUNTS;
 use crate::shallow::system::Shallow;
 
-pub(super) const BEGINNING: Beginning =
-    Beginning { magic: *b"frz shal", version: 2, length_at: 32, of: "a shallow liquid" };
+pub(super) const FORMAT: Format =
+    Format { magic: *b"frz shal", version: 2, length_at: 32, of: "a shallow liquid" };
 /// Bytes of the header.
 pub(super) const HEADER: usize = 168;
-/// Bytes of a strip's share of an array.
-pub(super) const SHARE: usize = 4 * STRIP;
-/// Arrays by column index: depths, two of fluxes, two of remainders.
+/// Bytes of a strip in an array of 32-bit numbers.
+pub(super) const STRIP_BYTES: usize = 4 * STRIP;
+/// Count of arrays by column index: depths, two of fluxes, two of remainders.
 pub(super) const ARRAYS: usize = 5;
 
 /// Counts of the elements in a state.
@@ -29,13 +29,14 @@ pub(super) struct Counts {
     pub(super) rows: usize,
     pub(super) points: usize,
     pub(super) links: usize,
-    /// Strips with heads.
+    /// Strips with heads of full columns.
     pub(super) heads: usize,
-    /// Parcels of liquid that waits for room.
+    /// Parcels of liquid that wait for room.
     pub(super) parcels: usize,
-    /// Packets in the air, and links at which liquid may wait to fall.
+    /// Packets in the air.
     pub(super) packets: usize,
-    pub(super) lips: usize,
+    /// Links at which liquid may wait to fall.
+    pub(super) waiting: usize,
     /// Scalars of the liquid.
     pub(super) scalars: usize,
 }
@@ -54,13 +55,13 @@ impl Counts {
             heads: heads(shallow).count(),
             parcels: shallow.remap.held.parcels().len(),
             packets: shallow.falls.packets.len(),
-            lips: shallow.falls.waiting.len(),
+            waiting: shallow.falls.waiting.len(),
             scalars: shallow.scalars().len(),
         }
     }
 
     /// As [`Counts::of`], but as if all columns were wet and full.
-    pub(super) fn most_of(shallow: &Shallow) -> Self {
+    pub(super) fn max_of(shallow: &Shallow) -> Self {
         let strips = shallow.columns.strips().len();
         Self { runs: strips.div_ceil(2), strips, heads: strips, ..Self::of(shallow) }
     }
@@ -72,20 +73,21 @@ impl Counts {
             + 4 * self.rows
             + 16 * self.parcels
             + PACKET_BYTES * self.packets
-            + WAITING_BYTES * self.lips
+            + WAITING_BYTES * self.waiting
             + 24 * self.points
             + 8 * self.links
-            + (4 + SHARE) * self.heads
-            + ARRAYS * SHARE * self.strips
+            + (4 + STRIP_BYTES) * self.heads
+            + ARRAYS * STRIP_BYTES * self.strips
             + self.scalars
-                * (SCALAR + 8 * (self.parcels + self.packets + self.lips) + 2 * SHARE * self.strips)
-            + SEAL
+                * (SCALAR + 8 * (self.parcels + self.packets + self.waiting) + 2 * STRIP_BYTES * self.strips)
+            + CHECKSUM
     }
 }
 
-/// First comes: magic, version, border, hash of the terrain, total length, counts, times, level outside, sums, time of the last packets.
+/// The header, after magic and version; in the file the total length follows the hash of the terrain.
 pub(super) struct Header {
     pub(super) border: u32,
+    /// Hash.
     pub(super) terrain: [u8; 16],
     pub(super) counts: Counts,
     /// Simulated time, length of the last step (s).
@@ -94,8 +96,9 @@ pub(super) struct Header {
     pub(super) still: i32,
     /// Units poured, sourced, drained, absorbed, lost and gained.
     pub(super) sums: [i64; 6],
-    /// Seconds since packets were last created, and how many times they were.
+    /// Seconds since packets were last created.
     pub(super) since: f64,
+    /// How many times packets were created.
     pub(super) tick: u64,
 }
 
@@ -103,13 +106,13 @@ pub(super) struct Header {
 pub(super) const SCALAR: usize = 32 + 16 * ACCOUNTS;
 
 impl Header {
-    pub(super) fn put(&self, to: &mut Put<'_>) {
-        let Counts { runs, strips, rows, points, links, heads, parcels, packets, lips, scalars } =
+    pub(super) fn put(&self, to: &mut Writer<'_>) {
+        let Counts { runs, strips, rows, points, links, heads, parcels, packets, waiting, scalars } =
             self.counts;
-        let counts = [runs, strips, rows, points, links, heads, parcels, packets, lips, scalars]
+        let counts = [runs, strips, rows, points, links, heads, parcels, packets, waiting, scalars]
             .map(|count| count as u32);
-        to.bytes(&BEGINNING.magic);
-        to.numbers(&[BEGINNING.version, self.border], u32::to_le_bytes);
+        to.bytes(&FORMAT.magic);
+        to.numbers(&[FORMAT.version, self.border], u32::to_le_bytes);
         to.bytes(&self.terrain);
         to.bytes(&(self.counts.size() as u64).to_le_bytes());
         to.numbers(&counts, u32::to_le_bytes);
@@ -128,7 +131,7 @@ impl Header {
         let mut count = || from.u32().map(|count| count as usize);
         let (runs, strips, rows) = (count()?, count()?, count()?);
         let (points, links, heads, parcels) = (count()?, count()?, count()?, count()?);
-        let (packets, lips, scalars) = (count()?, count()?, count()?);
+        let (packets, waiting, scalars) = (count()?, count()?, count()?);
         let times = [from.f64()?, from.f64()?];
         let still = from.u32()? as i32;
         from.take::<4>()?;
@@ -137,7 +140,7 @@ impl Header {
             *sum = i64::from_le_bytes(from.take()?);
         }
         let (since, tick) = (from.f64()?, u64::from_le_bytes(from.take()?));
-        let counts = Counts { runs, strips, rows, points, links, heads, parcels, packets, lips, scalars };
+        let counts = Counts { runs, strips, rows, points, links, heads, parcels, packets, waiting, scalars };
         Ok(Self { border, terrain, counts, times, still, sums, since, tick })
     }
 }

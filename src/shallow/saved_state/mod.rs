@@ -1,12 +1,12 @@
 //! Saves the state of the liquid as bytes and restores it; a restored liquid continues with the same bytes.
 //!
-//! Numbers are little-endian and uncompressed: a game that saves every second has a fraction of a millisecond for it. Only the columns of
-//! active strips are stored, so that a puddle in a large domain is small.
+//! Numbers are little-endian and uncompressed: a game that saves every second can spend a fraction of a millisecond on it. Only the columns
+//! of active strips are stored, so that a puddle in a large domain is small.
 //!
 //! | part | bytes |
 //! |---|---|
 //! | header: [`Header`] | [`HEADER`] |
-//! | runs of active strips: the first, and how many | 8 each |
+//! | runs of active strips: the first strip, and their count | 8 each |
 //! | upper bound of the depth of each row | 4 each |
 //! | liquid that waits for room: its cell, its height, units | 16 each |
 //! | packets in the air | [`PACKET_BYTES`] each |
@@ -16,7 +16,7 @@
 //! | strips of full columns with heads, then their heads | 4 each, then 64 each |
 //! | of each run: depths; fluxes to the east and to the south; remainders of both | 5 x 64 a strip |
 //! | of each scalar: its part ([`scalars`]) | |
-//! | hash of everything above | [`SEAL`] |
+//! | hash of everything above | [`CHECKSUM`] |
 
 mod detail;
 mod encoding;
@@ -36,16 +36,16 @@ use super::system::Shallow;
 use crate::error::{Error, Result};
 use crate::numeric::bytes::Reader;
 use crate::numeric::cpu::dispatch;
-use encoding::{Put, SEAL, SUMS, get, open, part, parts, refused, require, seal};
-use header::{ARRAYS, BEGINNING, Counts, HEADER, Header, SHARE, heads};
+use encoding::{CHECKSUM, SUMS, Writer, get, open, part, parts, refused, require, write_checksum};
+use header::{ARRAYS, Counts, FORMAT, HEADER, Header, STRIP_BYTES, heads};
 use scalars::Scalars;
 
-/// Upper bound of a flux (units a step): K limits transfers to the donor's depth.
-const MOST_FLUX: f32 = 2.0 * TOP as f32;
-/// Valid length of the last step (s): the next one's share of a flux must be finite.
-const LAST: RangeInclusive<f64> = 1e-20..=1e6;
-
-const WAITING: RangeInclusive<f64> = -1e18..=1e18;
+/// Maximum magnitude of a flux (units a step): K limits transfers to the donor's depth.
+const MAX_FLUX: f32 = 2.0 * TOP as f32;
+/// Valid range of the length of the last step (s): the next step scales fluxes by it, and they must stay finite.
+const STEP_LENGTH: RangeInclusive<f64> = 1e-20..=1e6;
+/// Valid range of the units that a flow point has pending.
+const PENDING: RangeInclusive<f64> = -1e18..=1e18;
 
 impl Shallow {
     /// The state between two frames: everything except the terrain, the parameters and the flow points, which the host has, and
@@ -101,8 +101,8 @@ impl Shallow {
     }
 
     /// Upper bound of the bytes that [`Shallow::save`] could return within the next frame.
-    pub(super) fn most_save_size(&self) -> usize {
-        Counts::most_of(self).size()
+    pub(super) fn max_save_size(&self) -> usize {
+        Counts::max_of(self).size()
     }
 
     /// Restores a state that was saved from this liquid, on the same columns.
@@ -113,7 +113,7 @@ impl Shallow {
     }
 
     fn write(&self, counts: &Counts, out: &mut [u8]) {
-        let mut to = Put(&mut out[..counts.size() - SEAL]);
+        let mut to = Writer(&mut out[..counts.size() - CHECKSUM]);
         self.header(counts).put(&mut to);
         let flow = &self.flow;
         for run in runs(flow.active()) {
@@ -123,9 +123,9 @@ impl Shallow {
         self.remap.held.parcels().iter().for_each(|parcel| to.bytes(&parcel.to_bytes()));
         self.falls.packets.iter().for_each(|packet| to.bytes(&packet.to_bytes()));
         self.falls.waiting.iter().for_each(|waiting| to.bytes(&waiting.to_bytes()));
-        for (kind, waiting, moved) in self.flows.progress() {
+        for (kind, pending, moved) in self.flows.progress() {
             to.numbers(&[code_of_kind(kind), 0], u32::to_le_bytes);
-            to.bytes(&waiting.to_le_bytes());
+            to.bytes(&pending.to_le_bytes());
             to.bytes(&moved.to_le_bytes());
         }
         to.numbers(&flow.links.flux, f32::to_le_bytes);
@@ -141,7 +141,7 @@ impl Shallow {
         }
         scalars::put(self, &mut to);
         debug_assert!(to.0.is_empty());
-        seal(&mut out[..counts.size()]);
+        write_checksum(&mut out[..counts.size()]);
     }
 
     fn header(&self, counts: &Counts) -> Header {
@@ -166,21 +166,21 @@ struct Saved<'a> {
     row_depths: &'a [[u8; 4]],
     parcels: &'a [[u8; 16]],
     packets: &'a [[u8; PACKET_BYTES]],
-    lips: &'a [[u8; WAITING_BYTES]],
+    waiting: &'a [[u8; WAITING_BYTES]],
     points: &'a [[u8; 24]],
     /// Fluxes, then remainders.
     links: &'a [[u8; 4]],
     head_strips: &'a [[u8; 4]],
-    heads: &'a [[u8; SHARE]],
-    /// Shares of arrays, run by run.
-    shares: &'a [[u8; SHARE]],
+    heads: &'a [[u8; STRIP_BYTES]],
+    /// Strips of all arrays, run by run.
+    strips: &'a [[u8; STRIP_BYTES]],
     /// The parts of scalars.
     scalars: Scalars<'a>,
 }
 
 impl<'a> Saved<'a> {
     fn read(bytes: &'a [u8]) -> Result<Self> {
-        let (header, body) = open::<HEADER>(bytes, &BEGINNING)?;
+        let (header, body) = open::<HEADER>(bytes, &FORMAT)?;
         let header = Header::read(header)?;
         let counts = header.counts;
         require(counts.size() == bytes.len(), "is damaged")?;
@@ -190,12 +190,12 @@ impl<'a> Saved<'a> {
             row_depths: parts(&mut from, counts.rows)?,
             parcels: parts(&mut from, counts.parcels)?,
             packets: parts(&mut from, counts.packets)?,
-            lips: parts(&mut from, counts.lips)?,
+            waiting: parts(&mut from, counts.waiting)?,
             points: parts(&mut from, counts.points)?,
             links: parts(&mut from, 2 * counts.links)?,
             head_strips: parts(&mut from, counts.heads)?,
             heads: parts(&mut from, counts.heads)?,
-            shares: parts(&mut from, ARRAYS * counts.strips)?,
+            strips: parts(&mut from, ARRAYS * counts.strips)?,
             scalars: Scalars::read(&mut from, &counts)?,
             header,
         })
@@ -209,9 +209,11 @@ impl<'a> Saved<'a> {
             return Err(refused("belongs to a liquid with another border"));
         }
         // On the same terrain, links differ only because of cliffs.
-        let (links, most) =
+        let (links, max_packets) =
             (shallow.flow.links.flux.len(), shallow.params.falls.map_or(0, |falls| falls.max_packets));
-        if (counts.links, counts.lips) != (links, shallow.falls.waiting.len()) || counts.packets > most {
+        if (counts.links, counts.waiting) != (links, shallow.falls.waiting.len())
+            || counts.packets > max_packets
+        {
             return Err(refused("belongs to a liquid with other falls"));
         }
         let own = shallow.flows.progress();
@@ -241,26 +243,26 @@ impl<'a> Saved<'a> {
         let (fluxes, left) = self.links.split_at(self.header.counts.links);
         let heads = self.heads.as_flattened().as_chunks().0;
         let within = |depths: &[u8; 4]| (0..=TOP).contains(&i32::from_le_bytes(*depths));
-        LAST.contains(&last)
+        STEP_LENGTH.contains(&last)
             && (self.header.still == BOTTOMLESS || self.header.still >= 0)
             && self.header.sums.iter().all(|sum| SUMS.contains(sum))
-            && self.points.iter().all(|point| WAITING.contains(&f64::from_le_bytes(part(point, 8))))
+            && self.points.iter().all(|point| PENDING.contains(&f64::from_le_bytes(part(point, 8))))
             && self.points.iter().all(|point| SUMS.contains(&i64::from_le_bytes(part(point, 16))))
             && self.row_depths.iter().all(within)
             && self.parcels().all(|parcel| parcel.is_valid_in(columns) && SUMS.contains(&parcel.units))
             && self.parcels().is_sorted_by(|a, b| a.cell < b.cell)
-            && !is_over(fluxes, MOST_FLUX)
+            && !is_over(fluxes, MAX_FLUX)
             && !is_over(left, 1.0)
             && !is_over(heads, f32::MAX)
             && !self.has_bad_columns(columns)
-            && self.scalars.has_good_numbers(self.lips(), self.depths())
+            && self.scalars.has_good_numbers(self.waiting(), self.depths())
     }
 
     fn has_good_falls(&self, shallow: &Shallow) -> bool {
         let (columns, links) = (&shallow.columns, &shallow.pipes.links);
         (0.0..=1e6).contains(&self.header.since)
             && self.packets().all(|packet| packet.is_valid_in(columns) && SUMS.contains(&packet.units))
-            && self.lips().enumerate().all(|(link, waiting)| {
+            && self.waiting().enumerate().all(|(link, waiting)| {
                 waiting.is_valid_in(columns, links, link) && SUMS.contains(&waiting.units)
             })
     }
@@ -283,17 +285,17 @@ impl<'a> Saved<'a> {
         self.packets.iter().map(Packet::from_bytes)
     }
 
-    fn lips(&self) -> impl Iterator<Item = Waiting> + Clone {
-        self.lips.iter().map(Waiting::from_bytes)
+    fn waiting(&self) -> impl Iterator<Item = Waiting> + Clone {
+        self.waiting.iter().map(Waiting::from_bytes)
     }
 
     fn head_strips(&self) -> impl Iterator<Item = usize> {
         self.head_strips.iter().map(|strip| u32::from_le_bytes(*strip) as usize)
     }
 
-    /// The five arrays of each run, in shares of a strip.
-    fn arrays(&self) -> impl Iterator<Item = (Range<usize>, [&'a [[u8; SHARE]]; ARRAYS])> + Clone {
-        let mut rest = self.shares;
+    /// The five arrays of each run, strip by strip.
+    fn arrays(&self) -> impl Iterator<Item = (Range<usize>, [&'a [[u8; STRIP_BYTES]]; ARRAYS])> + Clone {
+        let mut rest = self.strips;
         self.runs().map(move |run| {
             let arrays = std::array::from_fn(|_| {
                 let (own, others) = rest.split_at(run.len());
@@ -314,7 +316,7 @@ impl<'a> Saved<'a> {
         let Shallow { flow, flows, columns, remap, falls, .. } = &mut *shallow;
         remap.held.set(self.parcels().enumerate().map(|(at, parcel)| self.scalars.with_amounts(at, parcel)));
         let packets = self.packets().enumerate().map(|(at, packet)| self.scalars.in_packet(at, packet));
-        falls.set(packets, self.lips().enumerate().map(|(at, waiting)| self.scalars.at_link(at, waiting)));
+        falls.set(packets, self.waiting().enumerate().map(|(at, waiting)| self.scalars.at_link(at, waiting)));
         (falls.since, falls.tick) = (self.header.since, self.header.tick);
         let [poured, sourced, drained, absorbed, lost, gained] = self.header.sums;
         let mut stored = flow.stored();
@@ -351,7 +353,7 @@ impl<'a> Saved<'a> {
     }
 }
 
-/// Whether a number in an array by column index is invalid. Tests all, without branches.
+/// Whether an array by column index has an invalid number. Tests all of them, without branches.
 #[inline(always)]
 fn has_bad_columns(saved: &Saved<'_>, columns: &Columns) -> bool {
     let [bases, ceilings] =
@@ -367,21 +369,21 @@ fn has_bad_columns(saved: &Saved<'_>, columns: &Columns) -> bool {
                 bad |= depth | room.wrapping_sub(depth) | row_depth.wrapping_sub(depth);
             }
         }
-        for (numbers, most) in
-            [(east, MOST_FLUX), (south, MOST_FLUX), (remainder_east, 1.0), (remainder_south, 1.0)]
+        for (numbers, max) in
+            [(east, MAX_FLUX), (south, MAX_FLUX), (remainder_east, 1.0), (remainder_south, 1.0)]
         {
-            is_over_any |= is_over(numbers.as_flattened().as_chunks().0, most);
+            is_over_any |= is_over(numbers.as_flattened().as_chunks().0, max);
         }
     }
     bad < 0 || is_over_any
 }
 
-/// Whether a float exceeds a bound or is NaN.
+/// Whether the magnitude of a number is over `max`, or a number is NaN.
 #[inline(always)]
-fn is_over(numbers: &[[u8; 4]], most: f32) -> bool {
-    let most = most.to_bits() as i32;
-    let size = |number: &[u8; 4]| (u32::from_le_bytes(*number) & !(1 << 31)) as i32;
-    numbers.iter().fold(0, |bad, number| bad | (most - size(number))) < 0
+fn is_over(numbers: &[[u8; 4]], max: f32) -> bool {
+    let max = max.to_bits() as i32;
+    let magnitude = |number: &[u8; 4]| (u32::from_le_bytes(*number) & !(1 << 31)) as i32;
+    numbers.iter().fold(0, |bad, number| bad | (max - magnitude(number))) < 0
 }
 
 /// Whether ranges are non-empty, in order, disjoint, and end by `count`.

@@ -9,8 +9,8 @@
 
 use std::ops::Range;
 
-use super::encoding::{Put, get, part, parts, refused};
-use super::header::{Counts, SCALAR, SHARE};
+use super::encoding::{Writer, get, part, parts, refused};
+use super::header::{Counts, SCALAR, STRIP_BYTES};
 use crate::error::Result;
 use crate::numeric::bytes::Reader;
 use crate::shallow::columns::STRIP;
@@ -28,7 +28,7 @@ const SUMS: Range<i128> = -(1 << 120)..1 << 120;
 const WAITING: Range<i64> = -(1 << 62)..1 << 62;
 
 /// Writes the scalars of a liquid.
-pub(super) fn put(shallow: &Shallow, to: &mut Put<'_>) {
+pub(super) fn put(shallow: &Shallow, to: &mut Writer<'_>) {
     let amounts = &shallow.flow.amounts;
     for (at, scalar) in amounts.scalars.iter().enumerate() {
         let (law, half) = code_of_law(scalar.law);
@@ -37,9 +37,9 @@ pub(super) fn put(shallow: &Shallow, to: &mut Put<'_>) {
         to.numbers(&amounts.sums[at], i128::to_le_bytes);
         let parcels = shallow.remap.held.parcels();
         parcels.iter().for_each(|parcel| to.bytes(&parcel.amounts[at].to_le_bytes()));
-        let (packets, lips) = (&shallow.falls.packets, &shallow.falls.waiting);
+        let (packets, waiting) = (&shallow.falls.packets, &shallow.falls.waiting);
         packets.iter().for_each(|packet| to.bytes(&packet.amounts[at].to_le_bytes()));
-        lips.iter().for_each(|waiting| to.bytes(&waiting.amounts[at].to_le_bytes()));
+        waiting.iter().for_each(|waiting| to.bytes(&waiting.amounts[at].to_le_bytes()));
         for run in runs(shallow.flow.active()) {
             to.numbers(&amounts.amounts[at][run.start * STRIP..run.end * STRIP], f64::to_le_bytes);
         }
@@ -52,9 +52,9 @@ struct Part<'a> {
     head: &'a [u8; SCALAR],
     parcels: &'a [[u8; 8]],
     packets: &'a [[u8; 8]],
-    lips: &'a [[u8; 8]],
-    /// Two shares for each strip.
-    shares: &'a [[u8; SHARE]],
+    waiting: &'a [[u8; 8]],
+    /// Amounts of columns: two elements for each strip.
+    strips: &'a [[u8; STRIP_BYTES]],
 }
 
 /// The parts of all scalars.
@@ -64,14 +64,14 @@ pub(super) struct Scalars<'a> {
 }
 
 impl<'a> Scalars<'a> {
-    /// Finds the parts; if there are more scalars than a liquid may have, they are only counted.
+    /// Reads the parts; scalars beyond those that a liquid may have are only counted.
     pub(super) fn read(from: &mut Reader<'a>, counts: &Counts) -> Result<Self> {
         let mut all = [None; MAX_SCALARS];
         for own in all.iter_mut().take(counts.scalars) {
             let head = &parts(from, 1)?[0];
             let parcels = parts(from, counts.parcels)?;
-            let (packets, lips) = (parts(from, counts.packets)?, parts(from, counts.lips)?);
-            *own = Some(Part { head, parcels, packets, lips, shares: parts(from, 2 * counts.strips)? });
+            let (packets, waiting) = (parts(from, counts.packets)?, parts(from, counts.waiting)?);
+            *own = Some(Part { head, parcels, packets, waiting, strips: parts(from, 2 * counts.strips)? });
         }
         Ok(Self { count: counts.scalars, parts: all })
     }
@@ -105,18 +105,22 @@ impl<'a> Scalars<'a> {
     /// Whether all numbers are valid for a liquid.
     pub(super) fn has_good_numbers<'b>(
         &self,
-        lips: impl Iterator<Item = Waiting> + Clone,
+        waiting: impl Iterator<Item = Waiting> + Clone,
         depths: impl Iterator<Item = &'b [u8; 4]> + Clone,
     ) -> bool {
         self.iter().all(|part| {
             let due = part.number(24);
             (0.0..1e30).contains(&due)
                 && part.sums().iter().all(|sum| SUMS.contains(sum))
-                && [part.parcels, part.packets, part.lips]
+                && [part.parcels, part.packets, part.waiting]
                     .into_iter()
                     .flatten()
                     .all(|amount| WAITING.contains(&i64::from_le_bytes(*amount)))
-                && part.lips.iter().zip(lips.clone()).all(|(amount, lip)| lip.units > 0 || *amount == [0; 8])
+                && part
+                    .waiting
+                    .iter()
+                    .zip(waiting.clone())
+                    .all(|(amount, at)| at.units > 0 || *amount == [0; 8])
                 && part.has_good_amounts(depths.clone())
         })
     }
@@ -133,7 +137,7 @@ impl<'a> Scalars<'a> {
 
     /// Waiting liquid at a link, with its amounts.
     pub(super) fn at_link(&self, at: usize, waiting: Waiting) -> Waiting {
-        Waiting { amounts: self.amounts(|part| part.lips, at), ..waiting }
+        Waiting { amounts: self.amounts(|part| part.waiting, at), ..waiting }
     }
 
     fn amounts(&self, of: impl Fn(&Part<'a>) -> &'a [[u8; 8]], at: usize) -> [i64; MAX_SCALARS] {
@@ -144,12 +148,12 @@ impl<'a> Scalars<'a> {
         amounts
     }
 
-    /// Restores the amounts of runs, and the sums.
+    /// Restores the amounts of columns, the sums and the pending changes.
     pub(super) fn apply(&self, runs: impl Iterator<Item = Range<usize>> + Clone, amounts: &mut Amounts) {
         for (at, part) in self.iter().enumerate() {
             amounts.due[at] = part.number(24);
             amounts.sums[at] = part.sums();
-            let mut rest = part.shares;
+            let mut rest = part.strips;
             for run in runs.clone() {
                 let (own, others) = rest.split_at(2 * run.len());
                 rest = others;
@@ -171,17 +175,17 @@ impl Part<'_> {
 
     /// Whether amounts are integers within the range that the saved depths allow, plus a tolerance for rounding, and 0 without liquid.
     fn has_good_amounts<'b>(&self, depths: impl Iterator<Item = &'b [u8; 4]>) -> bool {
-        let amounts = self.shares.as_flattened().as_chunks::<8>().0;
+        let amounts = self.strips.as_flattened().as_chunks::<8>().0;
         depths.zip(amounts).fold(true, |good, (depth, amount)| {
             let (depth, amount) = (i32::from_le_bytes(*depth), f64::from_le_bytes(*amount));
-            let most = if depth > 0 { LEVELS * (f64::from(depth) + 1.0) } else { 0.0 };
+            let max = if depth > 0 { LEVELS * (f64::from(depth) + 1.0) } else { 0.0 };
             // Also false for NaN.
-            good & (amount.abs() <= most) & (nearest(amount) == amount)
+            good & (amount.abs() <= max) & (nearest(amount) == amount)
         })
     }
 }
 
-/// A law, and its half-life (s).
+/// The code of a law, and its half-life (s).
 fn code_of_law(law: Law) -> (u32, f64) {
     match law {
         Law::Dye => (0, 0.0),

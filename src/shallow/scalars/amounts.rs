@@ -6,11 +6,11 @@ use super::shares::{LEVELS, Levels, MAX_SCALARS, integer, level, share};
 use super::{Law, Scalar};
 use crate::shallow::columns::per_column::{Array, PerColumn};
 
-/// Decay is applied after this part of a half-life, or each step, if that is longer: in shorter intervals thin films would lose less than
-/// half an amount, which rounds to 0.
-const DECAY: f64 = 1.0 / 1024.0;
+/// Interval between decays, as a share of the half-life (each step, if that is longer). In shorter intervals thin films would lose less
+/// than half a unit of amount, which rounds to 0.
+const DECAY_INTERVAL: f64 = 1.0 / 1024.0;
 
-/// Columns of a flooded network, and those beside them, for which capacity is reserved from the beginning.
+/// Initial capacity for columns of a flooded network and those beside them.
 const PARTIES: usize = 2048;
 
 /// The origin or destination of an amount.
@@ -20,11 +20,13 @@ pub(in crate::shallow) enum Account {
     Poured,
     /// Added by sources.
     Sourced,
-    /// Removed by drains, and by absorbers.
+    /// Removed by drains.
     Drained,
+    /// Removed by absorbers.
     Absorbed,
-    /// Out of the domain, and in over its border.
+    /// Left the domain.
     Lost,
+    /// Entered over the border.
     Gained,
     /// Added by the law.
     Grown,
@@ -42,7 +44,7 @@ impl Account {
     }
 }
 
-/// Changes of a scalar in a step on some rows (amounts).
+/// Changes of a scalar in a step, on some rows (amounts, by account).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::shallow) struct Changes {
     pub lost: i128,
@@ -56,18 +58,18 @@ pub(in crate::shallow) struct Changes {
 pub(in crate::shallow) struct LawEffect {
     /// Levels that each unit gains.
     pub grows: f64,
-    /// Part of the amount that is lost.
+    /// Share of the amount that is lost.
     pub loses: f64,
 }
 
 impl LawEffect {
-    /// Applies it to the amount of so many units, as `apply_law` in `solver/transfers/scalars.rs` does to that of a column; returns the growth.
+    /// Applies it to the amount of this many units, as `apply_law` in `solver/transfers/scalars.rs` does to a column; returns the growth.
     pub fn change(&self, units: i64, amount: &mut i64) -> i128 {
         let (units, before) = (i128::from(units), i128::from(*amount));
         let kept = before - (*amount as f64 * self.loses).round_ties_even() as i128;
         let older = kept + units * self.grows as i128;
-        let most = units * LEVELS as i128;
-        let now = if self.grows > 0.0 { older.min(most) } else { older };
+        let max = units * LEVELS as i128;
+        let now = if self.grows > 0.0 { older.min(max) } else { older };
         *amount = now.clamp(i128::from(i64::MIN), i128::from(i64::MAX)) as i64;
         i128::from(*amount) - before
     }
@@ -77,11 +79,11 @@ impl LawEffect {
 #[derive(Debug, Clone)]
 pub(in crate::shallow) struct Amounts {
     pub scalars: Vec<Scalar>,
-    /// For each scalar, by column index, padded by a strip; empty for absent scalars. 0 where there is no liquid.
+    /// For each scalar, by column index, padded by a strip; empty for scalars that do not exist. 0 where there is no liquid.
     pub amounts: [PerColumn<f64>; MAX_SCALARS],
     /// By scalar and account.
     pub sums: [[i128; ACCOUNTS]; MAX_SCALARS],
-    /// Pending effect of each law, too small to be applied: levels, or seconds.
+    /// Pending effect of each law, still too small to be applied: levels of growth, or seconds of decay.
     pub due: [f64; MAX_SCALARS],
     /// The effects of the laws in this step.
     law_effects: [LawEffect; MAX_SCALARS],
@@ -97,7 +99,7 @@ impl Amounts {
         Self::new(Vec::new(), 0)
     }
 
-    /// Amounts 0 of each scalar, for so many indices.
+    /// Amounts of 0, for this many indices.
     pub fn new(scalars: Vec<Scalar>, len: usize) -> Self {
         // Alignment offsets of arrays that a step does not use at the same time.
         let positions = [Array::Under, Array::Ceiling, Array::Head, Array::Light];
@@ -125,7 +127,7 @@ impl Amounts {
         self.amounts.iter().map(PerColumn::bytes).sum()
     }
 
-    /// Changes the count of indices of a part of the columns; their contents are then unspecified.
+    /// Changes the count of indices of a part of the columns; their amounts are then unspecified.
     pub fn resize_part(&mut self, part: Range<usize>, len: usize) {
         for amounts in self.amounts.iter_mut().filter(|amounts| !amounts.is_empty()) {
             amounts.resize_part(part.clone(), len, 0.0);
@@ -155,7 +157,7 @@ impl Amounts {
                 }
                 Law::Decays(half) => {
                     *due += dt;
-                    if *due >= half * DECAY {
+                    if *due >= half * DECAY_INTERVAL {
                         effect.loses = -libm::expm1(-*due / half * std::f64::consts::LN_2);
                         *due = 0.0;
                     }
@@ -164,8 +166,8 @@ impl Amounts {
         }
     }
 
-    /// Ends a step that has changed amounts on some rows.
-    pub fn settle(&mut self, changes: &[Changes; MAX_SCALARS]) {
+    /// Adds the changes of a step to the accounts.
+    pub fn add_changes(&mut self, changes: &[Changes; MAX_SCALARS]) {
         for (sums, changes) in self.sums.iter_mut().zip(changes) {
             sums[Account::Lost as usize] += changes.lost;
             sums[Account::Gained as usize] += changes.gained;
@@ -174,7 +176,8 @@ impl Amounts {
         }
     }
 
-    /// Accounts for liquid added to a column (negative: removed): `before` units were there; added liquid has these concentrations.
+    /// Adds the amounts of liquid that is added to a column (negative: removed), and accounts for them. There were `before` units; added
+    /// liquid has these concentrations.
     pub fn add(&mut self, index: usize, before: i64, added: i64, levels: &Levels, account: Account) {
         for (at, level_in) in levels.iter().enumerate().take(self.count()) {
             let amount = &mut self.amounts[at][index];
@@ -190,8 +193,8 @@ impl Amounts {
         }
     }
 
-    /// Adds amounts to a column, for liquid that has already been added.
-    pub fn put(&mut self, index: usize, amounts: &[i64; MAX_SCALARS]) {
+    /// Adds amounts to a column, without an account.
+    pub fn add_amounts(&mut self, index: usize, amounts: &[i64; MAX_SCALARS]) {
         for (at, amount) in amounts.iter().enumerate().take(self.count()) {
             self.amounts[at][index] += *amount as f64;
         }
@@ -203,7 +206,7 @@ impl Amounts {
     }
 
     /// Adds amounts to an account.
-    pub fn count_in(&mut self, account: Account, amounts: &[i64; MAX_SCALARS]) {
+    pub fn add_to_account(&mut self, account: Account, amounts: &[i64; MAX_SCALARS]) {
         for (sums, amount) in self.sums.iter_mut().zip(amounts) {
             sums[account as usize] += i128::from(*amount);
         }
@@ -215,7 +218,7 @@ impl Amounts {
         strips.map(|amounts| i128::from(amounts.iter().map(|&amount| integer(amount)).sum::<i64>())).sum()
     }
 
-    /// The concentration of a column, in the scalar's own measure; 0 where it is dry.
+    /// The concentration of a column, in the scalar's own unit; 0 where it is dry.
     #[inline(always)]
     pub fn concentration(&self, scalar: usize, index: usize, depth: i32) -> f32 {
         (level(self.amounts[scalar][index], depth) * (self.scalars[scalar].range / LEVELS)) as f32

@@ -11,7 +11,7 @@ pub struct Scalar {
     pub name: String,
     /// How it changes.
     pub law: Law,
-    /// Concentrations are within -range to range, in the scalar's own measure, and are stored in steps of 2^-20 of it; 1e-9 to 1e9. For
+    /// Concentrations are within -range to range, in the scalar's own unit, and are stored in steps of 2^-20 of it; 1e-9 to 1e9. For
     /// example 1 for a dye, 100 (K) for a temperature above that of the room, 3600 (s) for an age.
     pub range: f64,
 }
@@ -41,10 +41,10 @@ impl Scalar {
 
     /// A concentration in levels.
     pub fn level(&self, concentration: f64) -> Result<i32> {
-        let (Self { name, range, .. }, least) = (self, -self.range);
+        let (Self { name, range, .. }, min) = (self, -self.range);
         ensure(
             concentration.abs() <= *range,
-            format_args!("a concentration of {concentration} of {name:?} is not within {least} to {range}"),
+            format_args!("a concentration of {concentration} of {name:?} is not within {min} to {range}"),
         )?;
         Ok((concentration / range * LEVELS).round() as i32)
     }
@@ -55,7 +55,7 @@ impl Scalar {
 pub enum Law {
     /// It does not: dye, salt, heat.
     Dye,
-    /// Decays by half in each half-life (s), above 0: heat that is lost to a room.
+    /// Decays by half in each half-life (s), 1e-6 to 1e12: heat that is lost to a room.
     Decays(f64),
     /// The time (s) since the liquid came in, averaged over the liquid of a column, clamped to `range`; the age of liquid that comes in is
     /// its concentration.

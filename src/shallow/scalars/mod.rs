@@ -2,8 +2,8 @@
 //!
 //! A column holds an *amount* of each, an integer: its concentration times its depth (`shares.rs`). A transfer moves the same share of a
 //! column's amounts as of its liquid, at the concentration at the start of the step (upwind), so that amounts are neither lost nor created:
-//! [`Shallow::scalar_balance`] counts them. Concentrations stay between those of the inflows, to about a level, 2^-20 of their range, and a
-//! uniform one stays uniform.
+//! [`Shallow::scalar_balance`] counts them. Concentrations stay between those of the inflows, to within about a level (2^-20 of their
+//! range), and a uniform one stays uniform.
 
 pub(super) mod amounts;
 mod law;
@@ -21,7 +21,7 @@ pub use law::{Law, Scalar};
 pub use shares::MAX_SCALARS;
 use shares::{LEVELS, Levels};
 
-/// Where all of a scalar is: concentration x volume (its own measure x m3).
+/// Where all of a scalar is: concentration x volume (its own unit x m3).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ScalarBalance {
     /// In the columns.
@@ -44,7 +44,7 @@ pub struct ScalarBalance {
     pub falling: f64,
     /// Added by its law; negative: removed.
     pub grown: f64,
-    /// Left by rounding in columns that ran dry: a few of the smallest amounts for each.
+    /// Removed from columns that ran dry, where rounding left a few of the smallest amounts.
     pub dried: f64,
     /// Unaccounted for (in smallest amounts): 0.
     pub error: i128,
@@ -68,7 +68,7 @@ impl Shallow {
             }
         }
         self.flow.set_scalars(&self.columns, Amounts::new(scalars.to_vec(), self.columns.len() + STRIP));
-        self.flows.forget_levels();
+        self.flows.clear_levels();
         self.remap.held.forget_amounts();
         self.falls.forget_amounts();
         Ok(())
@@ -151,7 +151,7 @@ impl Shallow {
         })
     }
 
-    /// The value of an amount of 1 of a scalar (its own measure x m3).
+    /// The value of an amount of 1 of a scalar (its own unit x m3).
     pub(super) fn amount_unit(&self, scalar: usize) -> f64 {
         let cell = self.columns.grid.cell;
         cell * cell * self.columns.heights.unit * (self.scalars()[scalar].range / LEVELS)

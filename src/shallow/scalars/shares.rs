@@ -33,8 +33,8 @@ pub(in crate::shallow) fn level(amount: f64, depth: i32) -> f64 {
     amount / f64::from(depth.max(1))
 }
 
-/// The amount in so many units of a concentration. Both roundings are monotonic: where the concentration is at most an integer, the amount
-/// is at most that times the units. All units of a column take its whole amount.
+/// The amount in this many units at a concentration. Rounding is monotonic here and in [`level`]: if a concentration is at most some
+/// integer, the amount is at most that integer times the units. All units of a column have its whole amount.
 #[inline(always)]
 pub(in crate::shallow) fn share(level: f64, units: f64) -> f64 {
     nearest(level * units)

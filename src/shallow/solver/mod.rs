@@ -363,7 +363,7 @@ impl Flow {
             for strip in results.woken.drain(..) {
                 self.active.wake(columns, strip as usize);
             }
-            self.amounts.settle(&results.scalar_changes);
+            self.amounts.add_changes(&results.scalar_changes);
             (results.scaled, results.outside, results.scalar_changes) = Default::default();
         }
         if self.active.any_asleep {
@@ -402,7 +402,7 @@ impl Flow {
                 changes,
             );
         }
-        self.amounts.settle(&changes);
+        self.amounts.add_changes(&changes);
     }
 
     /// Count of columns in the strips that a step works on, and an upper bound of those that are full.

@@ -1,8 +1,9 @@
 //! Where liquid enters and leaves: sources, drains, orifices and absorbers, at the end of each step (thesis Alg. 4.1, line 5).
 //!
-//! Each moves whole units. The volume that its rate requests is shared equally by the columns in its circle; the remainder of the division
-//! waits for the next step, so that a source delivers its rate to within one unit per column. What does not fit in the columns waits too,
-//! but no more than one step requests: a source in a full cavity stops, and does not catch up when the cavity opens.
+//! Each moves whole units. The volume that its rate requests is shared equally by the columns in its circle. The remainder of the division
+//! is pending until the next step, so that a source delivers its rate to within one unit per column. Liquid that does not fit in the
+//! columns is pending, too, but no more than one step requests: a source in a full cavity stops, and does not catch up when the cavity
+//! opens.
 
 mod pour;
 
@@ -37,9 +38,8 @@ pub enum Kind {
     Drain,
     /// Like a drain, until it has taken this volume (m3): gauze.
     Absorber(f64),
-    /// A hole in the ground, through which liquid drains under its own weight: Cd a (2 g H)^(1/2) a second (Torricelli's law), for the mean
-    /// depth H in its circle. The number is Cd a (m2): the hole's area times the share of it that the jet fills, 0.6 to 0.65 for a sharp
-    /// edge.
+    /// A hole in the ground, through which liquid drains under its own weight: Cd a (2 g H)^(1/2) m3/s (Torricelli's law), for the mean
+    /// depth H in its circle. The number is Cd a (m2): the hole's area a times its discharge coefficient Cd, 0.6 to 0.65 for a sharp edge.
     Orifice(f64),
 }
 
@@ -58,15 +58,16 @@ struct Placed {
     point: FlowPoint,
     columns: Vec<u32>,
     /// Units requested that have not moved yet.
-    waiting: f64,
-    /// Units moved so far: those that came in or went out.
+    pending: f64,
+    /// Units moved so far, in or out.
     moved: i64,
-    /// Concentrations of what enters.
+    /// Concentrations of the liquid that enters.
     levels: Levels,
 }
 
-/// Maximum units per column that a source owes, besides one step's request: remainders of divisions, also in cells of half the length.
-const OWED: f64 = 4.0;
+/// Maximum pending units per column from earlier steps, if a step requests less: remainders of divisions, also where four fine columns take
+/// over from a coarse one.
+const MAX_PENDING: f64 = 4.0;
 
 /// All flow points.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -132,10 +133,10 @@ impl FlowPoint {
     fn find_columns(&self, columns: &Columns, found: &mut Vec<u32>) {
         let grid = &columns.grid;
         let [x, y, z] = self.at;
-        let near = self.radius.max(2.0 * grid.cell);
+        let reach = self.radius.max(2.0 * grid.cell);
         let nearest = |cell: [usize; 2]| {
-            let (index, off) = columns.nearest(cell, y)?;
-            (off <= near).then_some(index as u32)
+            let (index, distance) = columns.nearest(cell, y)?;
+            (distance <= reach).then_some(index as u32)
         };
         found.clear();
         let mut has_cells = false;
@@ -144,7 +145,7 @@ impl FlowPoint {
             found.extend(nearest(cell));
         }
         if !has_cells {
-            // Rounding to 32 bits may put a vertex on the border of a terrain slightly outside.
+            // A vertex on the border of a terrain may lie slightly outside, as it is rounded to 32 bits.
             let within = |axis: usize, at: f64| {
                 let (low, size) = (grid.origin[axis], grid.size[axis] as f64 * grid.cell);
                 let inside = at.clamp(low, low + size * (1.0 - 1e-12));
@@ -156,7 +157,7 @@ impl FlowPoint {
 }
 
 impl Flows {
-    /// Replaces the flow points; what the previous ones have moved stays in the sums. `which` names one in an error.
+    /// Replaces the flow points; what the previous ones have moved stays in the sums. `which` names a point in an error.
     ///
     /// # Errors
     /// `Argument`: a number out of range, or a point that has no column within its radius (or two cells): it lies inside solid, or outside
@@ -201,19 +202,19 @@ impl Flows {
         placed.point.find_columns(columns, &mut placed.columns);
     }
 
-    /// Puts a point to rest; returns what it waits for and has moved (units), which it clears.
-    pub(super) fn rest(&mut self, point: usize) -> (f64, i64) {
+    /// Takes a point's columns away; returns its pending and its moved units, and clears them.
+    pub(super) fn deactivate(&mut self, point: usize) -> (f64, i64) {
         let placed = &mut self.placed[point];
         placed.columns.clear();
-        (std::mem::take(&mut placed.waiting), std::mem::take(&mut placed.moved))
+        (std::mem::take(&mut placed.pending), std::mem::take(&mut placed.moved))
     }
 
-    /// What a point waits for and has moved (units).
-    pub(super) fn waiting_and_moved(&self, point: usize) -> (f64, i64) {
-        (self.placed[point].waiting, self.placed[point].moved)
+    /// Pending and moved units of a point.
+    pub(super) fn pending_and_moved(&self, point: usize) -> (f64, i64) {
+        (self.placed[point].pending, self.placed[point].moved)
     }
 
-    /// Gives a flow point another rate (m3/s); what it waits for and has moved stays.
+    /// Gives a flow point another rate (m3/s); its pending and moved units stay.
     ///
     /// # Errors
     /// `Argument`: there is no such point, or the rate is negative or not finite.
@@ -240,8 +241,8 @@ impl Flows {
         self.placed.get_mut(point).ok_or_else(none)
     }
 
-    /// What enters through sources carries nothing from now on.
-    pub(super) fn forget_levels(&mut self) {
+    /// Sets all concentrations of sources to 0.
+    pub(super) fn clear_levels(&mut self) {
         self.placed.iter_mut().for_each(|placed| placed.levels = [0; MAX_SCALARS]);
     }
 
@@ -257,15 +258,15 @@ impl Flows {
         self.placed[point].moved
     }
 
-    /// Kind of each flow point, what it waits for and has moved (units), in their order: its part of a saved state.
+    /// Kind, pending units and moved units of each flow point, in order: their part of a saved state.
     pub(super) fn progress(&self) -> impl ExactSizeIterator<Item = (Kind, f64, i64)> + '_ {
-        self.placed.iter().map(|placed| (placed.point.kind, placed.waiting, placed.moved))
+        self.placed.iter().map(|placed| (placed.point.kind, placed.pending, placed.moved))
     }
 
-    /// Restores what a flow point waits for and has moved.
-    pub(super) fn set_progress(&mut self, point: usize, waiting: f64, moved: i64) {
+    /// Sets the pending and moved units of a flow point.
+    pub(super) fn set_progress(&mut self, point: usize, pending: f64, moved: i64) {
         let placed = &mut self.placed[point];
-        (placed.waiting, placed.moved) = (waiting, moved);
+        (placed.pending, placed.moved) = (pending, moved);
     }
 
     /// Moves what the points request in a step of `dt` that begins at `time` (s), under `gravity` (m/s2).
@@ -289,7 +290,7 @@ fn placed(columns: &Columns, points: &[FlowPoint], which: &impl Fn(usize) -> Str
         point.validate().map_err(|error| Error::argument(format!("{}: {error}", which(at))))?;
         let mut found = Vec::new();
         point.find_columns(columns, &mut found);
-        Ok(Placed { point: point.clone(), columns: found, waiting: 0.0, moved: 0, levels: [0; MAX_SCALARS] })
+        Ok(Placed { point: point.clone(), columns: found, pending: 0.0, moved: 0, levels: [0; MAX_SCALARS] })
     };
     points.iter().enumerate().map(position).collect()
 }
@@ -304,15 +305,15 @@ impl Placed {
         (opening * (2.0 * gravity * depth).sqrt()).min(rate)
     }
 
-    /// Moves what the point requests, in units of `volume` (m3); returns the units moved.
-    fn step(&mut self, columns: &Columns, flow: &mut Flow, asked: f64, volume: f64) -> i64 {
+    /// Moves the requested units, each of a `volume` (m3), and pending ones; returns the units moved.
+    fn step(&mut self, columns: &Columns, flow: &mut Flow, requested: f64, volume: f64) -> i64 {
         if self.columns.is_empty() {
             return 0;
         }
         let count = self.columns.len() as f64;
-        // Nothing is owed for long; a drain over a dry position does not catch up either.
-        self.waiting = self.waiting.min(asked.max(OWED * count)) + asked;
-        let mut share = (self.waiting / count).floor().min(1e18) as i64;
+        // Liquid that finds no room for long is not caught up later.
+        self.pending = self.pending.min(requested.max(MAX_PENDING * count)) + requested;
+        let mut share = (self.pending / count).floor().min(1e18) as i64;
         if let Kind::Absorber(capacity) = self.point.kind {
             let left = ((capacity / volume - self.moved as f64) / count).floor();
             share = share.min(left.clamp(0.0, 1e18) as i64);
@@ -326,10 +327,10 @@ impl Placed {
         let add = |&column: &u32| flow.add(columns, column as usize, sign * share, &self.levels, account);
         let moved = sign * self.columns.iter().map(add).sum::<i64>();
         self.moved += moved;
-        self.waiting -= moved as f64;
+        self.pending -= moved as f64;
         if sign < 0 {
-            // A drain over a dry position does not catch up later.
-            self.waiting = self.waiting.min(count);
+            // A drain that found too little does not catch up later.
+            self.pending = self.pending.min(count);
         }
         moved
     }

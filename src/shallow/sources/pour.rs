@@ -1,4 +1,4 @@
-//! Liquid that a host pours or takes at once, and the volumes that its flow points have moved.
+//! Pours of a host, and what it reads and sets at single flow points.
 
 use super::{FlowPoint, Kind};
 use crate::error::Result;
@@ -24,8 +24,8 @@ impl Shallow {
         self.flows.moved(point) as f64 * (cell * cell * self.columns.heights.unit)
     }
 
-    /// Moves a flow point with the terrain that it lies on; what it has moved and waits for stays. Where it finds no column it rests until
-    /// it does.
+    /// Moves a flow point with the terrain that it lies on; what it has moved, and what is pending, stays. Where it finds no column it
+    /// rests until it does.
     pub fn move_flow(&mut self, point: usize, at: [f64; 3]) {
         self.flows.move_to(&self.columns, point, at);
     }
@@ -44,7 +44,7 @@ impl Shallow {
         self.flows.is_resting(point)
     }
 
-    /// Sets another rate (m3/s) for a flow point: a valve. What it has moved, and how much an absorber holds, stays.
+    /// Gives a flow point another rate (m3/s), as a valve does. What it has moved, and what an absorber holds, stays.
     ///
     /// # Errors
     /// As [`Flows::set_rate`](super::Flows::set_rate).

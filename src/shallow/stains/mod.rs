@@ -16,16 +16,16 @@ use super::system::Shallow;
 use crate::error::{Error, Result};
 use crate::geometry::Vec3;
 use crate::numeric::checks::{check_not_negative, check_room};
-use wet::Wet;
+use wet::WetColumns;
 
-/// Invisible stains are set to 0, before they are so small that processors give different results.
-const UNSEEN: f64 = 1e-6;
+/// Below this, stains are invisible and set to 0, before they are so small that processors give different results.
+const INVISIBLE: f64 = 1e-6;
 
 /// How liquid stains the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Staining {
-    /// The scalar that stains, by its concentration over its range, from 0 to 1: clear liquid washes stains off. None: any liquid stains,
-    /// fully.
+    /// The scalar that stains, by its concentration over its range, from 0 to 1: liquid without it washes stains off. None: any liquid
+    /// stains, fully.
     pub scalar: Option<usize>,
     /// Minimum depth of a film that wets (m), 0 and up. Default: 1e-5.
     pub film: f64,
@@ -76,19 +76,21 @@ impl Staining {
 #[derive(Debug, Clone)]
 pub struct Stains {
     staining: Staining,
-    /// A hash of the mesh's triangles.
+    /// Hash of the mesh's triangles.
     mesh: [u8; 16],
-    /// For each vertex: its stain at the time (s) when it was last wet.
+    /// For each vertex, the time when it was last wet (s).
+    last_wet: Vec<f64>,
+    /// For each vertex, its stain at that time.
     stain: Vec<f32>,
-    since: Vec<f64>,
-    /// For each vertex: units absorbed, and its capacity in units. Empty, if the ground does not absorb.
+    /// For each vertex, units absorbed. Empty if the ground does not absorb.
     held: Vec<i64>,
+    /// For each vertex, units that it can absorb. Empty if the ground does not absorb.
     capacity: Vec<i64>,
     /// Volume of a unit of the liquid (m3).
     unit: f64,
     /// Simulated time at the last update (s).
     time: f64,
-    wet: Wet,
+    wet: WetColumns,
 }
 
 impl Stains {
@@ -123,12 +125,12 @@ impl Stains {
             staining,
             mesh: xxh3_128(&bytes).to_le_bytes(),
             stain: vec![0.0; count],
-            since: vec![f64::NEG_INFINITY; count],
+            last_wet: vec![f64::NEG_INFINITY; count],
             held: vec![0; capacity.len()],
             capacity,
             unit,
             time: liquid.time(),
-            wet: Wet::default(),
+            wet: WetColumns::default(),
         })
     }
 
@@ -142,8 +144,8 @@ impl Stains {
         self.stain.is_empty()
     }
 
-    /// Advances to the liquid's time; call it once a frame, with the present vertices: `positions` (m), of the ground that the liquid has.
-    /// Allocates nothing after the first call. Returns what the ground has absorbed since the last call (m3).
+    /// Advances to the liquid's time; call it once a frame, with the vertices of the ground as the liquid has it now: `positions` (m).
+    /// Allocates nothing after the first call. Returns the volume that the ground has absorbed since the last call (m3).
     ///
     /// # Errors
     /// `Argument`, and nothing changes: a count of vertices other than the mesh's; one that is not finite; a liquid with other units, or
@@ -159,10 +161,12 @@ impl Stains {
         if self.wet.is_empty() {
             return Ok(0.0);
         }
-        let comes = 1.0 - libm::exp(-passed / self.staining.takes);
-        // Staining takes no time, and none has passed.
-        let comes = if comes.is_nan() { 1.0 } else { comes };
-        let dry = self.staining.absorbs.map_or(0.0, |absorbing| absorbing.rate * passed / absorbing.capacity);
+        let approach = 1.0 - libm::exp(-passed / self.staining.takes);
+        // 0 / 0: staining takes no time, and none has passed.
+        let approach = if approach.is_nan() { 1.0 } else { approach };
+        // Share of its free capacity that a vertex absorbs.
+        let filled =
+            self.staining.absorbs.map_or(0.0, |absorbing| absorbing.rate * passed / absorbing.capacity);
         let mut absorbed = 0;
         for (vertex, position) in positions.iter().enumerate() {
             let Some(column) = self.wet.column_at(&liquid.columns, &liquid.flow.depth, position) else {
@@ -175,17 +179,17 @@ impl Stains {
                 }
                 None => 1.0,
             };
-            let before = self.at(vertex, last);
-            let after = before + (target - before) * comes;
-            self.stain[vertex] = if after < UNSEEN { 0.0 } else { after as f32 };
-            self.since[vertex] = now;
+            let before = self.stain_at(vertex, last);
+            let after = before + (target - before) * approach;
+            self.stain[vertex] = if after < INVISIBLE { 0.0 } else { after as f32 };
+            self.last_wet[vertex] = now;
             if let (Some(held), Some(capacity)) = (self.held.get_mut(vertex), self.capacity.get(vertex)) {
                 let room = *capacity - *held;
-                let asked = (room as f64 * dry).round_ties_even().min(room as f64) as i64;
-                if asked > 0 {
+                let requested = (room as f64 * filled).round_ties_even().min(room as f64) as i64;
+                if requested > 0 {
                     let flow = &mut liquid.flow;
                     let taken =
-                        -flow.add(&liquid.columns, column, -asked, &[0; MAX_SCALARS], Account::Absorbed);
+                        -flow.add(&liquid.columns, column, -requested, &[0; MAX_SCALARS], Account::Absorbed);
                     *held += taken;
                     absorbed += taken;
                 }
@@ -207,10 +211,10 @@ impl Stains {
 
     /// The stain of each vertex.
     pub(crate) fn each(&self) -> impl ExactSizeIterator<Item = f32> {
-        (0..self.len()).map(|vertex| self.at(vertex, self.time) as f32)
+        (0..self.len()).map(|vertex| self.stain_at(vertex, self.time) as f32)
     }
 
-    /// Absorbed liquid at each vertex, 0 to 1 of its capacity; 0, if the ground does not absorb.
+    /// Absorbed liquid at each vertex, 0 to 1 of its capacity; 0 if the ground does not absorb.
     ///
     /// # Errors
     /// As [`Stains::stains`].
@@ -220,7 +224,7 @@ impl Stains {
         Ok(())
     }
 
-    /// Absorbed liquid at each vertex, as part of its capacity.
+    /// Absorbed liquid at each vertex, as a share of its capacity.
     pub(crate) fn each_soaked(&self) -> impl ExactSizeIterator<Item = f32> {
         (0..self.len()).map(|vertex| match (self.held.get(vertex), self.capacity.get(vertex)) {
             (Some(held), Some(capacity)) => *held as f32 / (*capacity).max(1) as f32,
@@ -234,8 +238,8 @@ impl Stains {
     }
 
     /// The stain of a vertex at a time (s).
-    fn at(&self, vertex: usize, time: f64) -> f64 {
-        let (stain, dry) = (f64::from(self.stain[vertex]), time - self.since[vertex]);
+    fn stain_at(&self, vertex: usize, time: f64) -> f64 {
+        let (stain, dry) = (f64::from(self.stain[vertex]), time - self.last_wet[vertex]);
         if stain == 0.0 || dry <= 0.0 { stain } else { stain * libm::exp2(-dry / self.staining.half_life) }
     }
 

@@ -5,10 +5,10 @@
 //! | magic, with the version | 8 |
 //! | hash of the mesh's triangles | 16 |
 //! | volume of a unit, time | 8 each |
-//! | count of vertices, count of those that absorb | 8 each |
+//! | count of vertices, count of vertices that absorb | 8 each |
 //! | stains | 4 each |
-//! | time at which each was last wet | 8 each |
-//! | units that each holds | 8 each |
+//! | times at which vertices were last wet | 8 each |
+//! | units absorbed by each, if the ground absorbs | 8 each |
 //! | hash of everything above | 16 |
 
 use xxhash_rust::xxh3::xxh3_128;
@@ -18,12 +18,12 @@ use crate::error::{Error, Result};
 use crate::numeric::bytes::Reader;
 
 const MAGIC: [u8; 8] = *b"frzstn\0\x01";
-const SEAL: usize = 16;
+const CHECKSUM: usize = 16;
 
 impl Stains {
     /// Count of the bytes of [`Stains::save`].
     pub fn save_size(&self) -> usize {
-        56 + 12 * self.len() + 8 * self.held.len() + SEAL
+        56 + 12 * self.len() + 8 * self.held.len() + CHECKSUM
     }
 
     /// The stains as bytes, without the parameters of staining.
@@ -36,10 +36,10 @@ impl Stains {
         out.extend((self.len() as u64).to_le_bytes());
         out.extend((self.held.len() as u64).to_le_bytes());
         out.extend(self.stain.iter().flat_map(|stain| stain.to_le_bytes()));
-        out.extend(self.since.iter().flat_map(|since| since.to_le_bytes()));
+        out.extend(self.last_wet.iter().flat_map(|since| since.to_le_bytes()));
         out.extend(self.held.iter().flat_map(|held| held.to_le_bytes()));
-        let seal = xxh3_128(&out).to_le_bytes();
-        out.extend(seal);
+        let checksum = xxh3_128(&out).to_le_bytes();
+        out.extend(checksum);
         out
     }
 
@@ -50,8 +50,8 @@ impl Stains {
     /// liquid with other cells; ground that absorbs where this does not, or vice versa.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<()> {
         require(bytes.starts_with(&MAGIC), "are not of this format")?;
-        let (body, seal) = bytes.split_at(bytes.len().saturating_sub(SEAL));
-        require(xxh3_128(body).to_le_bytes() == *seal, "are cut short or damaged")?;
+        let (body, checksum) = bytes.split_at(bytes.len().saturating_sub(CHECKSUM));
+        require(xxh3_128(body).to_le_bytes() == *checksum, "are cut short or damaged")?;
         let mut from = Reader::new(&body[MAGIC.len()..]);
         let (mesh, unit): ([u8; 16], _) = (from.take()?, f64::from_le_bytes(from.take()?));
         let time = f64::from_le_bytes(from.take()?);
@@ -69,7 +69,7 @@ impl Stains {
             && held.clone().zip(&self.capacity).all(|(held, capacity)| (0..=*capacity).contains(&held));
         require(is_good, "are cut short or damaged")?;
         self.stain.iter_mut().zip(stain).for_each(|(to, stain)| *to = stain);
-        self.since.iter_mut().zip(since).for_each(|(to, since)| *to = since);
+        self.last_wet.iter_mut().zip(since).for_each(|(to, since)| *to = since);
         self.held.iter_mut().zip(held).for_each(|(to, held)| *to = held);
         self.time = time;
         Ok(())

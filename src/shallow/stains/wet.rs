@@ -6,25 +6,25 @@ use crate::shallow::columns::runs::runs;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_of};
 use crate::shallow::solver::Flow;
 
-/// A strip with columns that have a film.
+/// A strip with wet columns.
 #[derive(Debug, Clone, Copy)]
 struct WetStrip {
     strip: u32,
-    /// Bits of these columns.
+    /// A bit for each wet column.
     bits: u16,
-    /// The next strip over the same cells, or [`NONE`].
+    /// Position of the next strip over the same cells, or [`NONE`].
     next: u32,
 }
 
 /// The wet columns of a liquid.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Wet {
+pub(super) struct WetColumns {
     strips: Vec<WetStrip>,
-    /// The first strip over each 16 cells of a row, or [`NONE`].
+    /// For each 16 cells of a row, the position of the first strip over them, or [`NONE`].
     first: Vec<u32>,
 }
 
-impl Wet {
+impl WetColumns {
     /// Finds the columns that are deeper than a film (units).
     pub fn find(&mut self, columns: &Columns, flow: &Flow, film: i32) {
         let blocks = columns.grid.size[0].div_ceil(STRIP);
@@ -61,17 +61,17 @@ impl Wet {
         }
         let heights = &columns.heights;
         let height = (position.y - heights.low) / heights.unit;
-        let (mut nearest, mut least) = (None, columns.grid.cell / heights.unit);
+        let (mut nearest, mut min_distance) = (None, columns.grid.cell / heights.unit);
         while at != NONE {
             let WetStrip { strip, bits, next } = self.strips[at as usize];
             at = next;
             if bits >> (x % STRIP) & 1 == 1 {
                 let column = strip as usize * STRIP + x % STRIP;
                 let base = f64::from(columns.bases()[column]);
-                let off = (base - height).max(height - (base + f64::from(depth[column]))).max(0.0);
+                let distance = (base - height).max(height - (base + f64::from(depth[column]))).max(0.0);
                 // The strips of a block are in order, from the highest layer down.
-                if off <= least {
-                    (nearest, least) = (Some(column), off);
+                if distance <= min_distance {
+                    (nearest, min_distance) = (Some(column), distance);
                 }
             }
         }

@@ -99,7 +99,8 @@ impl Facet {
         }
     }
 
-    /// For one of the lines of [`Facet::cross_all`], the height (units) at which it crosses the triangle, and whether the triangle faces up.
+    /// For one of the lines of [`Facet::cross_all`], the height (units) at which it crosses the triangle, and whether the triangle faces
+    /// up.
     #[inline(always)]
     pub fn crossing_of(
         &self,

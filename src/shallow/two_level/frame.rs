@@ -29,16 +29,16 @@ impl Detail {
         let divided =
             [&mut self.fine, &mut self.coarse].map(|liquid| liquid.flow.divide(&liquid.columns, threads));
         if divided.contains(&true) {
-            ctx.pool().install(|| with_spinning_threads(threads, || self.whole(dt, cancel)))
+            ctx.pool().install(|| with_spinning_threads(threads, || self.step_or_restore(dt, cancel)))
         } else {
             let _flush = FlushDenormals::begin();
-            self.whole(dt, cancel)
+            self.step_or_restore(dt, cancel)
         }
     }
 
-    /// A whole frame, or nothing of it.
-    fn whole(&mut self, dt: f64, cancel: &AtomicBool) -> Result<Report> {
-        // Ask both: all steps are as short as those of the liquid with the shorter ones.
+    /// Makes the frame; if it fails, restores the state before it.
+    fn step_or_restore(&mut self, dt: f64, cancel: &AtomicBool) -> Result<Report> {
+        // All steps are as short as the liquid with the shorter steps needs.
         let may_take_long = [&mut self.fine, &mut self.coarse].map(|liquid| liquid.may_take_long(dt, None));
         if !may_take_long.contains(&true) {
             return self.steps(dt, &Stop::NEVER);
@@ -54,7 +54,7 @@ impl Detail {
     }
 
     fn steps(&mut self, dt: f64, stop: &Stop) -> Result<Report> {
-        let Self { fine, coarse, seam, rest, .. } = self;
+        let Self { fine, coarse, seam, remainders, .. } = self;
         let measures = [fine.measures(), coarse.measures()];
         let mut report = Report::default();
         let halvings = [&mut *fine, &mut *coarse]
@@ -80,7 +80,7 @@ impl Detail {
             if stop.is_requested() {
                 return Err(Error::Cancelled);
             }
-            seam.end_step(fine, coarse, rest);
+            seam.end_step(fine, coarse, remainders);
             report.steps = steps + 1;
             report.seconds = if length >= left { dt } else { report.seconds + length };
         }

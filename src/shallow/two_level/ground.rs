@@ -12,7 +12,7 @@ pub(super) struct Ground {
 }
 
 impl Ground {
-    /// Finds the ground of coarse cells.
+    /// The terrain's fine ground, and the coarse ground that follows from it.
     pub fn new(solids: &Solids) -> Self {
         let Grid { cell, origin, size: [nx, nz] } = solids.grid;
         let grid = Grid { cell: 2.0 * cell, origin, size: [nx / 2, nz / 2] };
@@ -35,7 +35,7 @@ impl Ground {
         ]
     }
 
-    /// The fine cells that belong to the coarse liquid, and the coarse cells that belong to the fine liquid.
+    /// The cells that the fine liquid and the coarse liquid leave to each other.
     pub fn excluded(near: &Cells) -> [ExcludedCells; 2] {
         [
             ExcludedCells { cells: near.clone(), is_inside: false },
@@ -43,13 +43,13 @@ impl Ground {
         ]
     }
 
-    /// The solids of a fine cell.
+    /// The solids of a fine cell; none if it is not near.
     pub fn fine_cell(&self, near: &Cells, [x, z]: [usize; 2]) -> &[Solid] {
         let is_near = near[0].contains(&x) && near[1].contains(&z);
         if is_near { self.fine.cell(self.fine.grid.index([x, z])) } else { &[] }
     }
 
-    /// The solids of a coarse cell.
+    /// The solids of a coarse cell; none if its fine cells are near.
     pub fn coarse_cell(&self, near: &Cells, [x, z]: [usize; 2]) -> &[Solid] {
         let is_near = near[0].contains(&(2 * x)) && near[1].contains(&(2 * z));
         if is_near { &[] } else { self.coarse.cell(self.coarse.grid.index([x, z])) }

@@ -1,17 +1,17 @@
 //! Level of detail: cells of the terrain's size near what matters, and of twice the size everywhere else.
 //!
 //! Two liquids share one lattice of heights: a *fine* one with ground only in a box of cells, the *near* part, and a *coarse* one with
-//! ground in all other cells (`ground.rs`). Outside its region each has no columns, and a wall at the edge. Along the edge of the box,
-//! separate pipes join the two (`seam.rs`). A coarse unit is four fine ones, so volumes are counted in fine units. What does not make up a
-//! coarse unit waits, with the scalars that it carries, and is part of the balance (`rests.rs`). When the box moves, four fine columns
-//! become a coarse one, or the reverse (`shift.rs`), and fluxes persist (`momentum.rs`). Nothing is lost. `surface/` writes one mesh of
-//! both.
+//! ground in all other cells (`ground.rs`). Outside its region each has no columns, and its edge is a wall. Along the edge of the box,
+//! separate pipes join the two (`seam.rs`). A coarse unit is four fine ones, so volumes are counted in fine units. A remainder of less than
+//! a coarse unit waits, with the scalars that it carries, and is part of the balance (`remainders.rs`). When the box moves, four fine
+//! columns become a coarse one, or the reverse (`shift.rs`), and fluxes persist (`momentum.rs`). Nothing is lost. `surface/` writes one
+//! mesh of both.
 
 mod buffers;
 mod frame;
 mod ground;
 mod momentum;
-pub(super) mod rests;
+pub(super) mod remainders;
 mod scalars;
 mod seam;
 mod shift;
@@ -33,13 +33,13 @@ use crate::error::{Error, Result};
 use crate::numeric::checks::ensure;
 use buffers::{Momentum, Shift};
 use ground::Ground;
-use rests::Rests;
+use remainders::Remainders;
 use seam::Seam;
 
-/// A side of a box that lies within this distance (edges of coarse cells) of a side of coarse cells counts as lying on it.
+/// A side of a box counts as lying on a side of coarse cells if it is within this distance of it (in lengths of a coarse cell).
 const ROUNDING: f64 = 1e-6;
 /// Fine units in a coarse one.
-const FINE: i64 = 4;
+const FINE_PER_COARSE: i64 = 4;
 
 /// Liquid that flows over a terrain, in fine cells nearby and in coarse ones far away.
 pub struct Detail {
@@ -52,15 +52,15 @@ pub struct Detail {
     /// The near cells.
     pub(super) near: Cells,
     /// For each coarse cell, the liquid that does not make up a coarse unit.
-    pub(super) rest: Rests,
+    pub(super) remainders: Remainders,
     points: Vec<FlowPoint>,
-    /// The state before the frame, kept if the frame may take so long that it can be cancelled: it is put back then.
+    /// The state before the frame, kept if the frame may take so long that it can be cancelled; a cancel restores it.
     kept: Vec<u8>,
 }
 
 impl Detail {
-    /// Dry ground; the cells of `near` are fine. All others are twice as large: their ground is the mean of that of four cells, layer by
-    /// layer.
+    /// Dry ground; the cells of `near` are fine. The edges of all others are twice as long, and their ground is the mean of four fine
+    /// cells, layer by layer.
     ///
     /// # Errors
     /// As [`Shallow::new`]; `Argument` also if the domain has an odd count of cells along an axis, as [`Detail::set_near`], and for falls
@@ -74,15 +74,15 @@ impl Detail {
         }
         check_near(&near, solids.grid.size)?;
         ensure(params.falls.is_none(), "liquid with a level of detail does not fall freely")?;
-        check_carried(&params)?;
+        check_no_thickening(&params)?;
         ensure(solids.layers() > 0, "the terrain has no surface that faces up within the domain")?;
         let ground = Ground::new(solids);
-        let [beyond, within] = Ground::excluded(&near).map(Some);
+        let [of_fine, of_coarse] = Ground::excluded(&near).map(Some);
         let [fine, coarse] = ground.divided_solids(&near);
-        let fine = Shallow::new_excluding(ctx, &fine, params.clone(), beyond)?;
-        let coarse = Shallow::new_excluding(ctx, &coarse, params, within)?;
+        let fine = Shallow::new_excluding(ctx, &fine, params.clone(), of_fine)?;
+        let coarse = Shallow::new_excluding(ctx, &coarse, params, of_coarse)?;
         let mut detail = Self {
-            rest: Rests::new(coarse.columns.grid.cells()),
+            remainders: Remainders::new(coarse.columns.grid.cells()),
             fine,
             coarse,
             ground,
@@ -102,7 +102,7 @@ impl Detail {
         &self.fine
     }
 
-    /// The liquid of the cells of twice the size; where they are near it has no columns.
+    /// The liquid of all other cells, of twice the size; in near cells it has no columns.
     pub fn coarse(&self) -> &Shallow {
         &self.coarse
     }
@@ -129,7 +129,7 @@ impl Detail {
         self.seam.find(&self.fine, &self.coarse, &self.near);
         momentum.end(self);
         self.momentum = momentum;
-        self.route();
+        self.assign_points();
         Ok(())
     }
 
@@ -152,7 +152,7 @@ impl Detail {
                 ground.coarse_cell(near, ground.coarse.grid.position(cell))
             })?,
         ];
-        Ok(self.after(moved))
+        Ok(self.rejoin(moved))
     }
 
     /// Sets the solid shapes that move over the terrain.
@@ -161,14 +161,14 @@ impl Detail {
     /// As [`Shallow::set_bodies`].
     pub fn set_bodies(&mut self, bodies: &[Shape]) -> Result<Moved> {
         let moved = [self.fine.set_bodies(bodies)?, self.coarse.set_bodies(bodies)?];
-        Ok(self.after(moved))
+        Ok(self.rejoin(moved))
     }
 
-    /// Joins cells of both sizes again after the ground has moved; returns the combined report.
-    fn after(&mut self, [fine, coarse]: [Moved; 2]) -> Moved {
+    /// Finds the pipes between both sizes again after the ground has moved; returns the combined report.
+    fn rejoin(&mut self, [fine, coarse]: [Moved; 2]) -> Moved {
         if fine.cells + coarse.cells > 0 {
             self.seam.find(&self.fine, &self.coarse, &self.near);
-            self.route();
+            self.assign_points();
         }
         Moved {
             cells: fine.cells + coarse.cells,
@@ -188,7 +188,7 @@ impl Detail {
     /// # Errors
     /// As [`Shallow::set_params`]; also for thickening.
     pub fn set_params(&mut self, params: Params) -> Result<()> {
-        check_carried(&params)?;
+        check_no_thickening(&params)?;
         self.fine.set_params(params.clone())?;
         self.coarse.set_params(params)
     }
@@ -199,14 +199,14 @@ impl Detail {
     /// As [`Shallow::set_flows`].
     pub fn set_flows(&mut self, points: &[FlowPoint], which: impl Fn(usize) -> String) -> Result<()> {
         for (at, point) in points.iter().enumerate() {
-            let owner = if self.is_near(point) { &self.fine } else { &self.coarse };
+            let owner = if self.is_near(point.at) { &self.fine } else { &self.coarse };
             let found = point.columns(&owner.columns);
             found.map_err(|error| Error::argument(format!("{}: {error}", which(at))))?;
         }
         self.fine.set_flows_resting(points, &which)?;
         self.coarse.set_flows_resting(points, &which)?;
         self.points = points.to_vec();
-        self.route();
+        self.assign_points();
         Ok(())
     }
 
@@ -221,13 +221,12 @@ impl Detail {
         Ok(())
     }
 
-    /// Pours a volume (m3; negative: takes it) as [`Shallow::pour_at`], into the cells of the size at the position; returns what came in
-    /// (m3).
+    /// Pours a volume (m3; negative: takes it) as [`Shallow::pour_at`], into cells of the size at this position; returns what came in (m3).
     ///
     /// # Errors
     /// As [`Shallow::pour_at`].
     pub fn pour_at(&mut self, at: [f64; 3], radius: f64, volume: f64) -> Result<f64> {
-        let is_near = self.holds(at);
+        let is_near = self.is_near(at);
         if is_near { &mut self.fine } else { &mut self.coarse }.pour_at(at, radius, volume)
     }
 
@@ -247,15 +246,11 @@ impl Detail {
         self.points[point].at = at;
         self.fine.move_flow(point, at);
         self.coarse.move_flow(point, at);
-        self.route();
-    }
-
-    fn is_near(&self, point: &FlowPoint) -> bool {
-        self.holds(point.at)
+        self.assign_points();
     }
 
     /// Whether a position lies over near cells.
-    fn holds(&self, [x, _, z]: [f64; 3]) -> bool {
+    fn is_near(&self, [x, _, z]: [f64; 3]) -> bool {
         let grid = self.fine.columns.grid;
         let within = |axis: usize, at: f64| {
             let at = (at - grid.origin[axis]) / grid.cell;
@@ -264,23 +259,22 @@ impl Detail {
         within(0, x) && within(1, z)
     }
 
-    /// Assigns each flow point to the cells of one size. The liquid that it has still to move, and the count of what it has moved, go with
-    /// it.
-    fn route(&mut self) {
+    /// Assigns each flow point to the liquid that it acts on. Its pending units, and the count of units that it has moved, go with it.
+    fn assign_points(&mut self) {
         for at in 0..self.points.len() {
-            let is_near = self.is_near(&self.points[at]);
             let position = self.points[at].at;
+            let is_near = self.is_near(position);
             let [own, other] =
                 if is_near { [&mut self.fine, &mut self.coarse] } else { [&mut self.coarse, &mut self.fine] };
             own.flows.move_to(&own.columns, at, position);
-            let (waiting, moved) = other.flows.rest(at);
-            let (own_waiting, own_moved) = own.flows.waiting_and_moved(at);
-            // In units of its new liquid.
-            let (waiting, moved) = match is_near {
-                true => (waiting * FINE as f64, moved * FINE),
-                false => (waiting / FINE as f64, moved / FINE),
+            let (pending, moved) = other.flows.deactivate(at);
+            let (own_pending, own_moved) = own.flows.pending_and_moved(at);
+            // In units of the liquid that it acts on now.
+            let (pending, moved) = match is_near {
+                true => (pending * FINE_PER_COARSE as f64, moved * FINE_PER_COARSE),
+                false => (pending / FINE_PER_COARSE as f64, moved / FINE_PER_COARSE),
             };
-            own.flows.set_progress(at, own_waiting + waiting, own_moved + moved);
+            own.flows.set_progress(at, own_pending + pending, own_moved + moved);
         }
     }
 
@@ -289,10 +283,10 @@ impl Detail {
         self.fine.time()
     }
 
-    /// Where all liquid is; what does not make up a coarse unit counts as held.
+    /// Where all the liquid is; remainders of less than a coarse unit count as held.
     pub fn balance(&self) -> Balance {
         let [fine, coarse] = [self.fine.units(), self.coarse.units()];
-        let sum = |of: fn(&Units) -> i64| of(&fine) + FINE * of(&coarse);
+        let sum = |of: fn(&Units) -> i64| of(&fine) + FINE_PER_COARSE * of(&coarse);
         let Grid { cell, .. } = self.fine.columns.grid;
         let units = Units {
             inside: sum(|units| units.inside),
@@ -302,29 +296,29 @@ impl Detail {
             absorbed: sum(|units| units.absorbed),
             lost: sum(|units| units.lost),
             gained: sum(|units| units.gained),
-            held: sum(|units| units.held) + self.rest.units(),
+            held: sum(|units| units.held) + self.remainders.units(),
             falling: 0,
         };
         units.balance(cell * cell * self.fine.columns.heights.unit)
     }
 }
 
-fn check_carried(params: &Params) -> Result<()> {
+fn check_no_thickening(params: &Params) -> Result<()> {
     ensure(params.thickening.is_none(), "liquid with a level of detail has no scalar that thickens it")
 }
 
-/// The smallest box of near cells with everything between two corners (m), as far as there are cells: minimum x and z, then maximum.
+/// The smallest box of near cells that covers a rectangle, as far as it lies in the domain. `bounds`: minimum x and z, then maximum (m).
 ///
 /// # Errors
 /// `Argument`: corners that enclose nothing, or lie outside the domain.
 pub fn cells_around(grid: &Grid, bounds: [f64; 4]) -> Result<Cells> {
     let [x0, z0, x1, z1] = bounds;
-    // Also where one is NaN.
+    // Also fails if a number is NaN.
     ensure(x0 < x1 && z0 < z1, format_args!("bounds = {bounds:?} m have no inside"))?;
     let range = |axis: usize, low: f64, high: f64| {
         let [low, high] = [low, high].map(|at| 0.5 * (at - grid.origin[axis]) / grid.cell);
         let count = (grid.size[axis] / 2) as f64;
-        // A mere rounding error adds no cells.
+        // Rounding errors add no cells.
         let [low, high] = [(low + ROUNDING).floor(), (high - ROUNDING).ceil()];
         2 * low.clamp(0.0, count) as usize..2 * high.clamp(0.0, count) as usize
     };

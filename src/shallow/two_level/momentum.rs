@@ -1,6 +1,7 @@
-//! Fluxes persist where the near cells move: through each side of a fine cell, whichever pipe it had before and has now.
+//! Keeps fluxes when the near cells move: the flow through each side of a fine cell continues through the pipe that the side has
+//! afterwards.
 //!
-//! A coarse pipe is that of two sides, with half of its volume each; the flux within a coarse cell is the mean of its inflow and outflow.
+//! A coarse pipe belongs to two sides, with half of its volume each; the flux within a coarse cell is the mean of its inflow and outflow.
 
 use super::Detail;
 use super::buffers::Momentum;
@@ -25,7 +26,7 @@ enum Pipe {
 }
 
 impl Momentum {
-    /// Starts with the sides of boxes of fine cells, and of two cells around them.
+    /// Stores the fluxes through the sides of the fine cells in some boxes and up to two cells around them.
     pub fn begin(&mut self, detail: &Detail, near: &Cells, boxes: impl Iterator<Item = Cells>) {
         let size = detail.fine.columns.grid.size;
         let wider = |cells: Cells| {
@@ -36,15 +37,17 @@ impl Momentum {
         let Self { boxes, layers, fluxes } = self;
         fluxes.clear();
         for cells in boxes {
-            each(cells, *layers, |cell, layer, axis| {
-                let flux = match side(detail, near, cell, layer, axis) {
+            each_side(cells, *layers, |cell, layer, axis| {
+                let flux = match pipe_at(detail, near, cell, layer, axis) {
                     Pipe::Fine(column) => detail.fine.flow.flux[axis][column],
                     Pipe::Coarse(column) => 2.0 * detail.coarse.flow.flux[axis][column],
                     Pipe::Within(column, before) => {
                         let flux = &detail.coarse.flow.flux[axis];
                         flux[column] + before.map_or(0.0, |before| flux[before])
                     }
-                    Pipe::Seam(column, axis, way) => way as f32 * detail.seam.flux(column, axis, way),
+                    Pipe::Seam(column, axis, direction) => {
+                        direction as f32 * detail.seam.flux(column, axis, direction)
+                    }
                     Pipe::Closed => 0.0,
                 };
                 fluxes.push(flux);
@@ -52,23 +55,28 @@ impl Momentum {
         }
     }
 
-    /// Gives the current pipes of the sides the former fluxes.
+    /// Sets the stored fluxes in the pipes that the sides have now.
     pub fn end(&self, detail: &mut Detail) {
         let near = detail.near.clone();
         let mut first = 0;
         for cells in &self.boxes {
             let width = 2 * self.layers;
             let mut at = first;
-            each(cells, self.layers, |cell, layer, axis| {
+            each_side(cells, self.layers, |cell, layer, axis| {
                 let flux = self.fluxes[at];
-                match side(detail, &near, cell, layer, axis) {
-                    Pipe::Fine(column) => set(&mut detail.fine, axis, column, flux),
+                match pipe_at(detail, &near, cell, layer, axis) {
+                    Pipe::Fine(column) => set_flux(&mut detail.fine, axis, column, flux),
                     Pipe::Coarse(column) if cell[1 - axis].is_multiple_of(2) => {
                         let row = if axis == 0 { cells[0].len() } else { 1 };
-                        set(&mut detail.coarse, axis, column, 0.25 * (flux + self.fluxes[at + row * width]));
+                        set_flux(
+                            &mut detail.coarse,
+                            axis,
+                            column,
+                            0.25 * (flux + self.fluxes[at + row * width]),
+                        );
                     }
-                    Pipe::Seam(column, axis, way) => {
-                        detail.seam.set_flux(column, axis, way, way as f32 * flux);
+                    Pipe::Seam(column, axis, direction) => {
+                        detail.seam.set_flux(column, axis, direction, direction as f32 * flux);
                     }
                     Pipe::Coarse(_) | Pipe::Within(..) | Pipe::Closed => {}
                 }
@@ -79,15 +87,15 @@ impl Momentum {
     }
 }
 
-fn set(liquid: &mut Shallow, axis: usize, column: usize, flux: f32) {
+fn set_flux(liquid: &mut Shallow, axis: usize, column: usize, flux: f32) {
     let open = [&liquid.pipes.east, &liquid.pipes.south][axis][column];
     if open > 0.0 {
         liquid.flow.flux[axis][column] = flux;
     }
 }
 
-/// The pipe that leads from a fine cell to the next along an axis.
-fn side(detail: &Detail, near: &Cells, cell: [usize; 2], layer: usize, axis: usize) -> Pipe {
+/// The pipe that leads from a fine cell to the next one along an axis.
+fn pipe_at(detail: &Detail, near: &Cells, cell: [usize; 2], layer: usize, axis: usize) -> Pipe {
     let mut next = cell;
     next[axis] += 1;
     let is_near = |cell: [usize; 2]| near[0].contains(&cell[0]) && near[1].contains(&cell[1]);
@@ -106,12 +114,12 @@ fn side(detail: &Detail, near: &Cells, cell: [usize; 2], layer: usize, axis: usi
     found.unwrap_or(Pipe::Closed)
 }
 
-/// Calls `see` with each fine cell of a box, layer and axis.
-fn each(cells: &Cells, layers: usize, mut see: impl FnMut([usize; 2], usize, usize)) {
+/// Calls `visit` with each fine cell of a box, layer and axis.
+fn each_side(cells: &Cells, layers: usize, mut visit: impl FnMut([usize; 2], usize, usize)) {
     for z in cells[1].clone() {
         for x in cells[0].clone() {
             for layer in 0..layers {
-                (0..2).for_each(|axis| see([x, z], layer, axis));
+                (0..2).for_each(|axis| visit([x, z], layer, axis));
             }
         }
     }

@@ -1,6 +1,6 @@
-//! Scalars of liquid in cells of two sizes. Amounts are counted in those of fine columns: one in a coarse column counts four times.
+//! Scalars of liquid in cells of two sizes. Amounts are counted as in fine columns: one in a coarse column counts four times.
 
-use super::{Detail, FINE};
+use super::{Detail, FINE_PER_COARSE};
 use crate::error::Result;
 use crate::shallow::scalars::{Scalar, ScalarBalance};
 
@@ -12,7 +12,7 @@ impl Detail {
     pub fn set_scalars(&mut self, scalars: &[Scalar]) -> Result<()> {
         self.fine.set_scalars(scalars)?;
         self.coarse.set_scalars(scalars)?;
-        self.rest.carry(scalars.len());
+        self.remainders.set_scalars(scalars.len());
         Ok(())
     }
 
@@ -40,14 +40,14 @@ impl Detail {
         self.coarse.set_sourced(point, concentrations)
     }
 
-    /// Where all of a scalar is; the part in what does not make up a coarse unit counts as held.
+    /// Where all of a scalar is; amounts in remainders of less than a coarse unit count as held.
     ///
     /// # Errors
     /// `Argument`: there is no such scalar.
     pub fn scalar_balance(&self, scalar: usize) -> Result<ScalarBalance> {
         let mut all = self.fine.scalar_sums(scalar)?;
-        all.add(&self.coarse.scalar_sums(scalar)?, i128::from(FINE));
-        all.held += self.rest.amount(scalar);
+        all.add(&self.coarse.scalar_sums(scalar)?, i128::from(FINE_PER_COARSE));
+        all.held += self.remainders.amount(scalar);
         Ok(all.balance(self.fine.amount_unit(scalar)))
     }
 }

@@ -5,8 +5,8 @@
 //! cell to the side, with the slope given by the coarse columns along the edge: otherwise a film that runs along the edge would oscillate
 //! across it.
 
-use super::FINE;
-use super::rests::{Load, Rests, change, of_column};
+use super::FINE_PER_COARSE;
+use super::remainders::{Contents, Remainders, add_to_column, of_column};
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lists::{refill, reset};
 use crate::shallow::columns::grid::{Cells, TOP};
@@ -18,8 +18,8 @@ use crate::shallow::solver::viscous_flux::{Step, StepKind, by_kind, flux_of, who
 use crate::shallow::time_step::Measures;
 use crate::shallow::{Shallow, time_step};
 
-/// Fine cells between the middles of a fine and a coarse cell.
-const APART: f32 = 1.5;
+/// Distance between the middles of a fine and a coarse cell (fine cells).
+const DISTANCE: f32 = 1.5;
 /// Keeps scaled transfers slightly below what is available, in 32 bits.
 const MARGIN: f32 = 1.0 - 1.0 / (1 << 20) as f32;
 
@@ -29,16 +29,19 @@ struct Pipe {
     /// Columns of the fine and of the coarse liquid.
     ends: [u32; 2],
     /// The previous and next coarse columns along the edge, or [`NONE`].
-    along: [u32; 2],
+    neighbours: [u32; 2],
     /// Where the fine cell lies along the edge, relative to the middle of the coarse one: -1 before it, 1 after it.
     side: i32,
     /// Direction to the coarse column: along x or z, and -1 or 1.
     axis: usize,
-    way: i32,
+    direction: i32,
+    /// See [`openness`].
     open: f32,
-    /// Flux out of the fine column (fine units a step), the rounding remainder, and the transfer.
+    /// Flux out of the fine column (fine units a step).
     flux: f32,
+    /// Rounding remainder of the flux.
     left: f32,
+    /// Whole fine units that move in this step.
     transfer: f32,
 }
 
@@ -48,14 +51,16 @@ pub(in crate::shallow) struct Seam {
     pipes: Vec<Pipe>,
     /// The previous pipes.
     old: Vec<Pipe>,
-    /// Columns of both liquids at such pipes, each once, and the position among them of each pipe's ends.
+    /// Columns of both liquids at such pipes, in order, each once.
     columns: [Vec<u32>; 2],
+    /// For each pipe, the positions of its ends among these columns.
     positions: Vec<[u32; 2]>,
-    /// What each of these columns gives and takes (fine units), then the factor by which it is scaled.
+    /// What each of these columns gives and takes (fine units).
     gives: [Vec<f64>; 2],
     takes: [Vec<f64>; 2],
+    /// K_min or K_max of each of these columns.
     factors: [Vec<f32>; 2],
-    /// For each of these columns, what it takes of each scalar, minus what it gives; empty where nothing is carried.
+    /// For each of these columns, what it takes of each scalar minus what it gives; empty without scalars.
     amounts: [Vec<[i64; MAX_SCALARS]>; 2],
     /// Cell of each coarse column (`Grid::index`).
     cells: Vec<u32>,
@@ -74,14 +79,14 @@ impl Seam {
         self.pipes.clear();
         for axis in 0..2 {
             let sides = [(near[axis].start, -1), (near[axis].end - 1, 1)];
-            for (across, way) in sides {
+            for (across, direction) in sides {
                 for along in near[1 - axis].clone() {
                     let cell = if axis == 0 { [across, along] } else { [along, across] };
-                    self.join(fine, coarse, cell, axis, way);
+                    self.join(fine, coarse, cell, axis, direction);
                 }
             }
         }
-        let key = |pipe: &Pipe| (pipe.axis, pipe.way, pipe.ends);
+        let key = |pipe: &Pipe| (pipe.axis, pipe.direction, pipe.ends);
         self.pipes.sort_unstable_by_key(key);
         let mut old = self.old.iter().peekable();
         for pipe in &mut self.pipes {
@@ -116,10 +121,10 @@ impl Seam {
         }
     }
 
-    /// Joins the columns of a fine cell to those of the coarse cell across a side.
-    fn join(&mut self, fine: &Shallow, coarse: &Shallow, cell: [usize; 2], axis: usize, way: i32) {
+    /// Adds the pipes between the columns of a fine cell and those of the coarse cell across one of its sides.
+    fn join(&mut self, fine: &Shallow, coarse: &Shallow, cell: [usize; 2], axis: usize, direction: i32) {
         let size = fine.columns.grid.size;
-        let beyond = cell[axis].wrapping_add_signed(way as isize);
+        let beyond = cell[axis].wrapping_add_signed(direction as isize);
         if beyond >= size[axis] {
             return;
         }
@@ -133,7 +138,7 @@ impl Seam {
                     continue;
                 }
                 let layer = coarse.columns.layer(j);
-                let along = [-1, 1].map(|step| {
+                let neighbours = [-1, 1].map(|step| {
                     let mut cell = other;
                     cell[1 - axis] = cell[1 - axis].wrapping_add_signed(step);
                     let column = coarse.columns.column(cell, layer);
@@ -142,11 +147,11 @@ impl Seam {
                 });
                 self.pipes.push(Pipe {
                     ends: [i as u32, j as u32],
-                    along,
+                    neighbours,
                     side,
                     axis,
-                    way,
-                    open: openness(fine, coarse, [i, j], along),
+                    direction,
+                    open: openness(fine, coarse, [i, j], neighbours),
                     flux: 0.0,
                     left: 0.0,
                     transfer: 0.0,
@@ -156,13 +161,13 @@ impl Seam {
     }
 
     /// Flux of the pipe of a fine column across a side (fine units a step); 0 if there is none.
-    pub fn flux(&self, column: usize, axis: usize, way: i32) -> f32 {
-        self.find_pipe(column, axis, way).map_or(0.0, |pipe| self.pipes[pipe].flux)
+    pub fn flux(&self, column: usize, axis: usize, direction: i32) -> f32 {
+        self.find_pipe(column, axis, direction).map_or(0.0, |pipe| self.pipes[pipe].flux)
     }
 
     /// Changes that flux, if there is a pipe.
-    pub fn set_flux(&mut self, column: usize, axis: usize, way: i32, flux: f32) {
-        if let Some(pipe) = self.find_pipe(column, axis, way) {
+    pub fn set_flux(&mut self, column: usize, axis: usize, direction: i32, flux: f32) {
+        if let Some(pipe) = self.find_pipe(column, axis, direction) {
             self.pipes[pipe].flux = flux;
         }
     }
@@ -180,9 +185,9 @@ impl Seam {
         }
     }
 
-    fn find_pipe(&self, column: usize, axis: usize, way: i32) -> Option<usize> {
-        let wanted = (axis, way, column as u32);
-        let key = |pipe: &Pipe| (pipe.axis, pipe.way, pipe.ends[0]);
+    fn find_pipe(&self, column: usize, axis: usize, direction: i32) -> Option<usize> {
+        let wanted = (axis, direction, column as u32);
+        let key = |pipe: &Pipe| (pipe.axis, pipe.direction, pipe.ends[0]);
         let pipe = self.pipes.partition_point(|pipe| key(pipe) < wanted);
         self.pipes.get(pipe).filter(|pipe| key(pipe) == wanted).map(|_| pipe)
     }
@@ -191,7 +196,7 @@ impl Seam {
     /// grow.
     pub fn begin_step(&mut self, fine: &Shallow, coarse: &Shallow, measures: &Measures, length: f64) {
         let step = time_step::step(&fine.params, measures, length, self.last);
-        let step = Step { drive: step.drive / APART, ..step };
+        let step = Step { drive: step.drive / DISTANCE, ..step };
         self.last = length;
         let (seam, step) = (&mut *self, &step);
         self.is_moving = by_kind!(step, K =>
@@ -199,16 +204,16 @@ impl Seam {
     }
 
     /// Makes the transfers across the edge, limited to the liquid and the room that the step has left in the columns.
-    pub fn end_step(&mut self, fine: &mut Shallow, coarse: &mut Shallow, rest: &mut Rests) {
+    pub fn end_step(&mut self, fine: &mut Shallow, coarse: &mut Shallow, remainders: &mut Remainders) {
         if !self.is_moving {
             return;
         }
         for gives in [true, false] {
-            if (gives || self.has_ceilings) && self.is_beyond(gives, fine, coarse) {
+            if (gives || self.has_ceilings) && self.find_factors(gives, fine, coarse) {
                 self.scale(gives);
             }
         }
-        self.move_units(fine, coarse, rest);
+        self.move_units(fine, coarse, remainders);
     }
 
     /// Finds all fluxes and transfers; returns whether there is a transfer.
@@ -232,9 +237,10 @@ impl Seam {
                     .then(|| i64::from(coarse_bases[end] + coarse_depths[end]))
             };
             // Eight times the rise over a quarter of a cell to the side.
-            let rise = if depth[1] == 0 { 0 } else { rise(i64::from(eta), pipe.along.map(beside)) as i32 };
+            let rise =
+                if depth[1] == 0 { 0 } else { rise(i64::from(eta), pipe.neighbours.map(beside)) as i32 };
             // The tilt of gravity is per cell.
-            let tilt = (APART * step.tilt[pipe.axis] as f32) as i32 * pipe.way;
+            let tilt = (DISTANCE * step.tilt[pipe.axis] as f32) as i32 * pipe.direction;
             let fall = bases[i] + depth[0] - eta - (pipe.side * rise) / 8 + tilt;
             let depth = depth.map(|depth| depth as f32);
             let light = if K::VISCOUS && !K::WHOLE { fast_films::light(step, depth, pipe.flux) } else { 1.0 };
@@ -250,23 +256,23 @@ impl Seam {
     }
 
     /// Finds K_min of the columns that give, or K_max of those that take, ignoring their outflow; returns whether one is below 1.
-    fn is_beyond(&mut self, gives: bool, fine: &Shallow, coarse: &Shallow) -> bool {
+    fn find_factors(&mut self, gives: bool, fine: &Shallow, coarse: &Shallow) -> bool {
         let Self { gives: given, takes: taken, factors, columns, .. } = self;
         let sums = if gives { given } else { taken };
         let mut any = false;
         factors.iter_mut().for_each(|factors| factors.fill(1.0));
         for (end, liquid) in [fine, coarse].into_iter().enumerate() {
-            let each = if end == 0 { 1.0 } else { FINE as f64 };
+            let fine_units = if end == 0 { 1.0 } else { FINE_PER_COARSE as f64 };
             for ((&sum, factor), &column) in sums[end].iter().zip(&mut factors[end]).zip(&columns[end]) {
                 let column = column as usize;
                 let depth = liquid.flow.depths()[column];
                 let room = liquid.columns.ceilings()[column] - liquid.columns.bases()[column] - depth;
-                // A coarse column may take more than it is given, by less than a unit.
-                let has = if gives { depth } else { room - 1 };
-                let has = each * f64::from(has.max(0));
+                // With its remainder, a coarse column may take up to a unit more than it is given.
+                let available = if gives { depth } else { room - 1 };
+                let available = fine_units * f64::from(available.max(0));
                 // This is rare.
-                if sum > has {
-                    (*factor, any) = ((has / sum) as f32 * MARGIN, true);
+                if sum > available {
+                    (*factor, any) = ((available / sum) as f32 * MARGIN, true);
                 }
             }
         }
@@ -288,24 +294,24 @@ impl Seam {
         }
     }
 
-    /// Moves whole fine units with what they carry; what does not make up a coarse unit waits in its cell.
-    fn move_units(&mut self, fine: &mut Shallow, coarse: &mut Shallow, rest: &mut Rests) {
+    /// Moves whole fine units with what they carry; a remainder of less than a coarse unit waits in its cell.
+    fn move_units(&mut self, fine: &mut Shallow, coarse: &mut Shallow, remainders: &mut Remainders) {
         self.find_amounts(fine, coarse);
         let Self { gives, takes, columns, cells, amounts, .. } = self;
-        let net = |end: usize, position: usize| Load {
+        let net = |end: usize, position: usize| Contents {
             units: (takes[end][position] - gives[end][position]) as i64,
             amounts: amounts[end].get(position).copied().unwrap_or_default(),
         };
         for (position, &column) in columns[0].iter().enumerate() {
-            change(fine, column as usize, &net(0, position));
+            add_to_column(fine, column as usize, &net(0, position));
         }
         for (position, (&column, &cell)) in columns[1].iter().zip(&*cells).enumerate() {
             let net = net(1, position);
-            if net != Load::default() {
-                // All of the column, and what waits.
+            if net != Contents::default() {
+                // All of the column, with the remainder of its cell.
                 let own = of_column(coarse, column as usize);
-                let now = rest.whole(cell as usize, &own.in_fine().with(&net));
-                change(coarse, column as usize, &now.without(&own));
+                let now = remainders.take_whole_units(cell as usize, &own.in_fine().plus(&net));
+                add_to_column(coarse, column as usize, &now.minus(&own));
             }
         }
         for liquid in [fine, coarse] {
@@ -314,8 +320,7 @@ impl Seam {
         self.gives.iter_mut().chain(&mut self.takes).for_each(|sums| sums.fill(0.0));
     }
 
-    /// Finds how much of each scalar every column takes (minus what it gives): a pipe moves it at the concentration of the column that
-    /// gives.
+    /// Finds how much of each scalar every column takes (minus what it gives): a pipe moves it at the concentration of the donor.
     fn find_amounts(&mut self, fine: &Shallow, coarse: &Shallow) {
         let Self { pipes, positions, columns, amounts, .. } = self;
         let count = fine.flow.amounts.count();
@@ -352,27 +357,27 @@ fn add(gives: &mut [Vec<f64>; 2], takes: &mut [Vec<f64>; 2], positions: &[u32; 2
     }
 }
 
-/// The rise of a surface between the columns before and behind another one, or twice that on the side of the only one that is wet.
+/// The rise of a surface from the column before another one to the column after it; if only one of them is wet, twice the rise on its side.
 pub(super) fn rise(own: i64, sides: [Option<i64>; 2]) -> i64 {
     match sides {
-        [Some(before), Some(behind)] => behind - before,
+        [Some(before), Some(after)] => after - before,
         [Some(before), None] => 2 * (own - before),
-        [None, Some(behind)] => 2 * (behind - own),
+        [None, Some(after)] => 2 * (after - own),
         [None, None] => 0,
     }
 }
 
 /// 1 / (1 + slope^2)^2 of the ground between both columns, as for all other pipes; slopes are clamped to 60 degrees.
-fn openness(fine: &Shallow, coarse: &Shallow, [i, j]: [usize; 2], along: [u32; 2]) -> f32 {
+fn openness(fine: &Shallow, coarse: &Shallow, [i, j]: [usize; 2], neighbours: [u32; 2]) -> f32 {
     let bases = |columns: &Columns, column: usize| f64::from(columns.bases()[column]);
     let cell = fine.columns.grid.cell / fine.columns.heights.unit;
-    let across = match along.map(|end| (end != NONE).then(|| bases(&coarse.columns, end as usize))) {
-        [Some(before), Some(behind)] => (behind - before) / (4.0 * cell),
+    let across = match neighbours.map(|end| (end != NONE).then(|| bases(&coarse.columns, end as usize))) {
+        [Some(before), Some(after)] => (after - before) / (4.0 * cell),
         [Some(before), None] => (bases(&coarse.columns, j) - before) / (2.0 * cell),
-        [None, Some(behind)] => (behind - bases(&coarse.columns, j)) / (2.0 * cell),
+        [None, Some(after)] => (after - bases(&coarse.columns, j)) / (2.0 * cell),
         [None, None] => 0.0,
     };
-    let down = (bases(&fine.columns, i) - bases(&coarse.columns, j)) / (f64::from(APART) * cell);
+    let down = (bases(&fine.columns, i) - bases(&coarse.columns, j)) / (f64::from(DISTANCE) * cell);
     let square = (down * down + across * across).min(3.0);
     (1.0 / ((1.0 + square) * (1.0 + square))) as f32
 }

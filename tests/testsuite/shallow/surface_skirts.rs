@@ -59,14 +59,14 @@ fn a_film_on_a_shelf_ends_at_its_edge_and_nowhere_over_it() {
         );
         assert_eq!(mesh.triangles[..bare.triangles.len()], bare.triangles, "the surface itself is the same");
         mesh.assert_manifold();
-        let hems = bare.positions.len()..;
+        let skirt_vertices = bare.positions.len()..;
         let open = open_edges(&mesh);
         assert!(!open.is_empty());
         for edge in open {
             for vertex in edge {
-                assert!(hems.contains(&(vertex as usize)), "the surface is open over the shelf");
+                assert!(skirt_vertices.contains(&(vertex as usize)), "the surface is open over the shelf");
                 let [_, y, _] = mesh.positions[vertex as usize];
-                assert!((y - 1.5).abs() < 1e-6, "a hem lies on the shelf: {y}");
+                assert!((y - 1.5).abs() < 1e-6, "a skirt vertex lies on the shelf: {y}");
             }
         }
     }
@@ -101,10 +101,11 @@ fn hems_are_half_a_cell_out_and_their_normals_lean_out() {
     let mut ledges = Ledges::default();
     ledges.find(&columns);
     let mesh = skirted(&columns, &depth, &ledges);
-    let hems = mesh.positions.iter().zip(&mesh.normals).filter(|([_, y, _], _)| (y - 1.5).abs() < 1e-6);
+    let skirt_vertices =
+        mesh.positions.iter().zip(&mesh.normals).filter(|([_, y, _], _)| (y - 1.5).abs() < 1e-6);
     // Cells of 0.5 m from (-1, 2): the shelf from 0.5 to 3.5 and from 3 to 6.
     let (mut count, low) = (0, [0.5, 3.0]);
-    for (&[x, _, z], normal) in hems {
+    for (&[x, _, z], normal) in skirt_vertices {
         count += 1;
         let [a, b] = [x - low[0], z - low[1]];
         let out = [
@@ -136,7 +137,7 @@ fn liquid_below_that_reaches_the_shelf_needs_no_skirt() {
     let mut ledges = Ledges::default();
     ledges.find(&columns);
     let mesh = skirted(&columns, &depth, &ledges);
-    assert!(mesh.positions.iter().all(|[_, y, _]| *y > 1.5 + 1e-3), "a hem under water");
+    assert!(mesh.positions.iter().all(|[_, y, _]| *y > 1.5 + 1e-3), "a skirt vertex under water");
 }
 
 #[test]
@@ -193,10 +194,10 @@ fn skirts_end_at_the_silhouette_of_the_ground() {
     let (mut ledges, mut silhouette) = (Ledges::default(), Silhouette::default());
     silhouette.fit(&mut ledges, &columns, &positions, &faces).unwrap();
     let mesh = skirted(&columns, &depth, &ledges);
-    let hems: Vec<_> = mesh.positions.iter().filter(|[_, y, _]| (y - 0.4).abs() < 1e-5).collect();
-    assert!(hems.len() > 60, "{}", hems.len());
+    let skirt_vertices: Vec<_> = mesh.positions.iter().filter(|[_, y, _]| (y - 0.4).abs() < 1e-5).collect();
+    assert!(skirt_vertices.len() > 60, "{}", skirt_vertices.len());
     let mut corners: BTreeMap<[bool; 2], usize> = BTreeMap::new();
-    for [x, _, z] in hems {
+    for [x, _, z] in skirt_vertices {
         let on = |at: f32, ends: [f32; 2]| ends.into_iter().any(|end| (at - end).abs() < 2e-6);
         let [along, across] = [on(*x, [low[0], high[0]]), on(*z, [low[1], high[1]])];
         assert!(along || across, "({x}, {z}) is not on the edge of the slab");

@@ -22,7 +22,7 @@ impl Shown<'_> {
         let (columns, liquid) = (self.liquid.columns, self.liquid);
         let (strip, position) = (index / STRIP, index % STRIP);
         let state = &found.states[strip];
-        let [west, east, north, south] = if state.rough >> position & 1 == 1 {
+        let [west, east, north, south] = if state.in_odd >> position & 1 == 1 {
             let beside = |step| liquid.wet_beside(index, step);
             [beside([-1, 0]), beside([1, 0]), beside([0, -1]), beside([0, 1])]
         } else {
@@ -37,10 +37,10 @@ impl Shown<'_> {
             ]
         };
         let own = self.heights[index];
-        let slope = |before: Option<usize>, behind: Option<usize>| {
-            let cells = if before.is_some() && behind.is_some() { 1.0 } else { 2.0 };
+        let slope = |before: Option<usize>, after: Option<usize>| {
+            let cells = if before.is_some() && after.is_some() { 1.0 } else { 2.0 };
             let height = |side: Option<usize>| side.map_or(own, |side| self.heights[side]);
-            height(before).wrapping_sub(height(behind)) as f32 * self.slope * cells
+            height(before).wrapping_sub(height(after)) as f32 * self.slope * cells
         };
         upright(slope(west, east), slope(north, south))
     }

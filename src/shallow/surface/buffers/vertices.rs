@@ -183,8 +183,7 @@ impl<'a> Vertices<'a> {
             for ((out, (west, east)), (north, south)) in
                 vectors(out, at, len).iter_mut().zip(across).zip(along)
             {
-                let slope =
-                    |before: &i32, behind: &i32| before.wrapping_sub(*behind) as f32 * self.shown.slope;
+                let slope = |before: &i32, after: &i32| before.wrapping_sub(*after) as f32 * self.shown.slope;
                 let [x, y, z] = upright(slope(west, east), slope(north, south));
                 *out = self.frame.order(x, y, z * self.frame.sign);
             }
@@ -225,11 +224,11 @@ impl<'a> Vertices<'a> {
         let mut normals = [[0.0; 3]; STRIP];
         for x in 0..STRIP {
             let has = |side: usize| sides[side] >> x & 1 == 1;
-            let slope = |[before, behind]: [i32; 2], has: [bool; 2]| {
-                let [before, behind] =
-                    [if has[0] { before } else { own[x] }, if has[1] { behind } else { own[x] }];
+            let slope = |[before, after]: [i32; 2], has: [bool; 2]| {
+                let [before, after] =
+                    [if has[0] { before } else { own[x] }, if has[1] { after } else { own[x] }];
                 let cells = if has[0] & has[1] { 1.0 } else { 2.0 };
-                before.wrapping_sub(behind) as f32 * slope * cells
+                before.wrapping_sub(after) as f32 * slope * cells
             };
             let along = slope([line[x], line[x + 2]], [has(0), has(1)]);
             let [x_up, y, z] = upright(along, slope([north[x], south[x]], [has(2), has(3)]));
@@ -305,7 +304,7 @@ fn write_spans(
         for strip in span.first..span.first + span.len {
             let state = &found.states[strip];
             let [west, east, north, south] = state.sides;
-            let plain = state.wet & west & east & north & south & !state.rough;
+            let plain = state.wet & west & east & north & south & !state.in_odd;
             let first = strip * STRIP;
             if plain == u16::MAX {
                 run = Run { first: if run.len == 0 { first } else { run.first }, len: run.len + STRIP };
@@ -322,7 +321,7 @@ fn write_spans(
             }
             let between = u16::MAX << first_columns & (u32::from(u16::MAX) >> last_columns) as u16;
             // Columns that need not be written one by one.
-            let smooth = state.used & state.wet & !state.rough & between;
+            let smooth = state.used & state.wet & !state.in_odd & between;
             let mut left = state.used & between;
             while left != 0 {
                 let position = left.trailing_zeros();

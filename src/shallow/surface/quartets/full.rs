@@ -39,8 +39,8 @@ fn find_wet_strips(liquid: LiquidColumns<'_>, active: Option<&[bool]>, found: &m
 /// Depth, base, ceiling and underside: each at 16 positions, and at the 16 positions one cell to the east.
 type Windows<'a> = [[&'a [i32; STRIP]; 2]; 4];
 
-/// Finds the quartets that are linked as a whole (the highest of their heights is below the lowest ceiling, the lowest not below the highest
-/// underside), and those whose sum of heights is larger at the ends of the diagonal from north-east to south-west.
+/// Finds the quartets that are linked as a whole (the highest of their heights is below the lowest ceiling, the lowest not below the
+/// highest underside), and those whose sum of heights is larger at the ends of the diagonal from north-east to south-west.
 #[inline(always)]
 fn compare([depth, base, ceiling, under]: Windows<'_>, south: Windows<'_>) -> [u16; 2] {
     let [depth_s, base_s, ceiling_s, under_s] = south;
@@ -212,7 +212,7 @@ fn add_odd(columns: &Columns, found: &mut Found, strip: usize, covered: [u16; 4]
     if row > 0 {
         before = [wet & has_east & !covered[2], wet & has_west & !covered[3]];
     }
-    found.states[strip].rough = here[0] | here[1] | before[0] | before[1];
+    found.states[strip].in_odd = here[0] | here[1] | before[0] | before[1];
     let mut add = |block: usize, odd: u16| {
         if odd != 0 {
             found.blocks[block].odd |= odd;

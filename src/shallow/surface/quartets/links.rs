@@ -109,7 +109,7 @@ impl<'a> LiquidColumns<'a> {
         if found == Some(&wanted) {
             return Some(guess);
         }
-        if found.is_none_or(|behind| *behind > wanted)
+        if found.is_none_or(|following| *following > wanted)
             && guess
                 .checked_sub(1)
                 .and_then(|before| strips.get(before))
@@ -140,8 +140,8 @@ pub(in crate::shallow::surface) fn find_above(columns: &Columns, out: &mut Vec<u
         out,
         strips.iter().enumerate().map(|(strip, own)| {
             let wanted = Strip { layer: own.layer + 1, ..*own };
-            let behind = &strips[strip + 1..strips.len().min(strip + across + 2)];
-            (strip + 1 + behind.partition_point(|other| *other < wanted)) as u32
+            let following = &strips[strip + 1..strips.len().min(strip + across + 2)];
+            (strip + 1 + following.partition_point(|other| *other < wanted)) as u32
         }),
     );
 }

@@ -14,7 +14,8 @@ pub(in crate::shallow::surface) struct Search {
     /// Triangles of the quartet that was searched last.
     triangles: Vec<[u32; 3]>,
     walled_quartet: WalledQuartet,
-    /// Triangles of all odd quartets without walls (0) and with walls (1), and how many each quartet has; quartets without any are left out.
+    /// Triangles of all odd quartets without walls (0) and with walls (1), and how many each quartet has; quartets without any are left
+    /// out.
     found: [Vec<[u32; 3]>; 2],
     counts: [Vec<u32>; 2],
 }
@@ -74,7 +75,8 @@ impl Search {
     }
 }
 
-/// Adds the triangles of groups whose first wet column is `wet`, at `corner`, given the columns at the other corners that it is linked with.
+/// Adds the triangles of groups whose first wet column is `wet`, at `corner`, given the columns at the other corners that it is linked
+/// with.
 #[inline(always)]
 pub fn add_triangles(corner: usize, wet: &Entry, linked: [Option<&Entry>; 4], triangles: &mut Vec<[u32; 3]>) {
     let may_join = |a: &Entry, b: &Entry| !a.wet && !b.wet || a.is_linked(b);
@@ -186,8 +188,8 @@ pub(in crate::shallow::surface) fn each_odd_triangle(
         for quartet in positions(quartets.odd) {
             let kind = usize::from(quartets.walled >> quartet & 1);
             let count = counts[kind].next().map_or(0, |count| *count as usize);
-            let (own, behind) = rest[kind].split_at(count);
-            rest[kind] = behind;
+            let (own, others) = rest[kind].split_at(count);
+            rest[kind] = others;
             own.iter().for_each(|triangle| add(*triangle));
         }
     }

@@ -13,7 +13,7 @@ pub(in crate::shallow::surface) struct State {
     /// Of these, the ones divided from north-east to south-west.
     pub turned: u16,
     /// Wet columns in an odd quartet.
-    pub rough: u16,
+    pub in_odd: u16,
     /// Columns that full quartets link with a wet one of the same layer to the west, east, north and south.
     pub sides: [u16; 4],
     /// Columns that are walls.

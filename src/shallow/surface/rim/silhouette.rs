@@ -52,8 +52,8 @@ impl Silhouette {
         Ok(())
     }
 
-    /// Skirt vertices of all columns at which films end within the domain, in order of columns. Vertices must be finite, and the vertices of
-    /// faces must exist.
+    /// Skirt vertices of all columns at which films end within the domain, in order of columns. Vertices must be finite, and the vertices
+    /// of faces must exist.
     fn find(&mut self, columns: &Columns, positions: &[Vec3], faces: &[[u32; 3]]) -> Result<&[SkirtVertex]> {
         self.find_ends_of_films(columns)?;
         if self.skirt_vertices.is_empty() {

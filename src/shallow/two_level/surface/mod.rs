@@ -3,24 +3,25 @@
 //! The meshes of both liquids ([`crate::shallow::surface`]) end at the centres of their outermost columns. The strip of 1.5 fine cells
 //! between them is stitched from vertex to vertex: a triangle on each coarse column and its two fine ones, two between it and the next, and
 //! one at each corner of the near cells (`stitches.rs`). Columns are linked across it as within a liquid. A column of the strip that has no
-//! vertex in either mesh gets one (`sewn.rs`). Where a surface ends at a wall beyond the edge, it ends at the column before the wall.
+//! vertex in either mesh gets one (`added_vertices.rs`). Where a surface ends at a wall beyond the edge, it ends at the column before the
+//! wall.
 
-mod sewn;
+mod added_vertices;
 mod stitches;
 
 use super::Detail;
 use crate::error::Result;
 use crate::shallow::columns::NONE;
 use crate::shallow::surface::{self, Counts, Depths, Indices, Layout, Target};
-use sewn::Sewn;
+use added_vertices::AddedVertices;
 use stitches::Stitches;
 
 /// The maximum counts that the surface of any liquid in these columns can have.
 pub fn bound(detail: &Detail) -> Counts {
     let [fine, coarse] = [&detail.fine, &detail.coarse].map(|liquid| surface::bound(&liquid.columns));
-    let [sewn, triangles] = stitches::bound(detail);
+    let [added, triangles] = stitches::bound(detail);
     Counts {
-        vertices: fine.vertices + coarse.vertices + sewn,
+        vertices: fine.vertices + coarse.vertices + added,
         extras: fine.extras + coarse.extras,
         indices: fine.indices + coarse.indices + 3 * triangles,
     }
@@ -36,7 +37,7 @@ pub struct Surface {
     /// Vertex indices of the coarse mesh, starting from 0.
     indices: Vec<u32>,
     stitches: Stitches,
-    sewn: Sewn,
+    added: AddedVertices,
 }
 
 impl Surface {
@@ -50,10 +51,10 @@ impl Surface {
         }
         self.indices.clear();
         self.indices.reserve(surface::bound(&detail.coarse.columns).indices);
-        let [sewn, triangles] = stitches::bound(detail);
+        let [added, triangles] = stitches::bound(detail);
         let [fine, coarse] = liquids.map(|liquid| liquid.columns.layers());
         self.stitches.reserve(triangles, fine.max(coarse));
-        self.sewn.reserve(sewn, triangles);
+        self.added.reserve(added, triangles);
     }
 
     /// Size of the mesh that [`Surface::build`] would write. `depths` are those of the fine liquid and of the coarse one; their ledges are
@@ -89,18 +90,18 @@ impl Surface {
         let counts = self.sum(both);
         target.check(&counts)?;
         let [fine, coarse] = both;
-        let Self { liquids, columns, indices, stitches, sewn } = self;
+        let Self { liquids, columns, indices, stitches, added } = self;
         liquids[0].build(&detail.fine.columns, depths[0], layout, target)?;
         indices.resize(coarse.indices, 0);
-        let mut behind = part(target, fine.vertices);
-        behind.indices = Indices::U32(indices);
-        liquids[1].build(&detail.coarse.columns, depths[1], layout, &mut behind)?;
-        let own = fine.vertices + coarse.vertices;
-        sewn.write(detail, depths, layout, stitches, &mut part(target, own));
+        let mut coarse_target = skip_vertices(target, fine.vertices);
+        coarse_target.indices = Indices::U32(indices);
+        liquids[1].build(&detail.coarse.columns, depths[1], layout, &mut coarse_target)?;
+        let first_added = fine.vertices + coarse.vertices;
+        added.write(detail, depths, layout, stitches, &mut skip_vertices(target, first_added));
         if let Some(out) = &mut target.columns {
             let first = detail.fine.columns.len() as u32;
             let coarse = columns[1].iter().map(|&column| if column == NONE { NONE } else { first + column });
-            let ids = coarse.chain(stitches.sewn.iter().copied());
+            let ids = coarse.chain(stitches.added.iter().copied());
             out[fine.vertices..].iter_mut().zip(ids).for_each(|(out, column)| *out = column);
         }
         let coarse = indices.iter().map(|vertex| fine.vertices as u32 + vertex);
@@ -110,7 +111,7 @@ impl Surface {
         Ok(counts)
     }
 
-    /// Finds both meshes, and the strip between them.
+    /// Finds the sizes of both meshes, and the strip between them.
     fn find(&mut self, detail: &Detail, depths: [&Depths<'_>; 2]) -> Result<[Counts; 2]> {
         let liquids = [&detail.fine, &detail.coarse];
         let mut both = [Counts::default(); 2];
@@ -127,7 +128,7 @@ impl Surface {
 
     fn sum(&self, [fine, coarse]: [Counts; 2]) -> Counts {
         Counts {
-            vertices: fine.vertices + coarse.vertices + self.stitches.sewn.len(),
+            vertices: fine.vertices + coarse.vertices + self.stitches.added.len(),
             extras: fine.extras + coarse.extras,
             indices: fine.indices + coarse.indices + self.stitches.indices.len(),
         }
@@ -139,8 +140,8 @@ fn without_ledges<'a>(depths: &Depths<'a>) -> Depths<'a> {
     Depths { ledges: None, ..*depths }
 }
 
-/// The part of a target after its first vertices, without indices and columns.
-fn part<'t>(target: &'t mut Target<'_>, first: usize) -> Target<'t> {
+/// A target without its first vertices, indices and columns.
+fn skip_vertices<'t>(target: &'t mut Target<'_>, first: usize) -> Target<'t> {
     let Target { positions, normals, depths, opacities, velocities, carried, layers, .. } = target;
     Target {
         positions: positions.as_deref_mut().map(|out| &mut out[3 * first..]),
