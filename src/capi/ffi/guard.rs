@@ -44,7 +44,6 @@ use frz_status::*;
 
 /// A failure: its status and message.
 pub(in crate::capi) struct Failure {
-    /// The number.
     pub status: frz_status,
     /// One sentence.
     pub text: String,
@@ -65,7 +64,7 @@ impl Failure {
     }
 }
 
-/// Refuses an argument with a fault.
+/// Returns an argument failure if there is a fault.
 pub(in crate::capi) fn refuse<T: Into<String>>(fault: bool, text: impl FnOnce() -> T) -> Outcome {
     if fault { Err(Failure::argument(text())) } else { Ok(()) }
 }
@@ -86,24 +85,24 @@ impl From<Error> for Failure {
 }
 
 /// Maximum length (bytes) of an error message, including its terminating zero.
-const LONGEST: usize = 1024;
+const MAX_MESSAGE: usize = 1024;
 
 thread_local! {
     // No destructor: a thread may end after the library is unloaded.
-    static LAST: RefCell<[u8; LONGEST]> = const { RefCell::new([0; LONGEST]) };
+    static LAST: RefCell<[u8; MAX_MESSAGE]> = const { RefCell::new([0; MAX_MESSAGE]) };
     static DEPTH: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Runs the body of an interface function. A failure or a panic becomes its status and this thread's last error.
+/// Runs the body of an interface function. A failure or a panic sets this thread's last error, and its status is returned.
 pub(in crate::capi) fn guard(body: impl FnOnce() -> Outcome) -> frz_status {
-    keep_quiet();
+    silence_panics();
     DEPTH.set(DEPTH.get() + 1);
     let outcome = catch_unwind(AssertUnwindSafe(body));
     DEPTH.set(DEPTH.get() - 1);
     let failure = match outcome {
         Ok(Ok(())) => return FRZ_OK,
         Ok(Err(failure)) => failure,
-        Err(panic) => Failure::new(FRZ_ERROR_INTERNAL, format!("internal error: {}", words(&*panic))),
+        Err(panic) => Failure::new(FRZ_ERROR_INTERNAL, format!("internal error: {}", panic_message(&*panic))),
     };
     remember(&failure.text);
     failure.status
@@ -125,27 +124,26 @@ pub(in crate::capi) fn last_error() -> *const c_char {
 }
 
 fn remember(text: &str) {
-    let cut = cut_at(text, LONGEST - 1);
+    let cut = cut_at(text, MAX_MESSAGE - 1);
     LAST.with_borrow_mut(|last| {
         last[..cut].copy_from_slice(&text.as_bytes()[..cut]);
         last[cut] = 0;
     });
 }
 
-/// How many bytes of a text to keep: at most the given number, ending between characters.
-fn cut_at(text: &str, most: usize) -> usize {
-    // C would end the text at an embedded zero.
+/// Length (bytes) to which a text is cut: at most `max`, at a character boundary, before any embedded zero.
+fn cut_at(text: &str, max: usize) -> usize {
     let end = text.find('\0').unwrap_or(text.len());
-    (0..=most.min(end)).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0)
+    (0..=max.min(end)).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0)
 }
 
-fn words(panic: &(dyn Any + Send)) -> &str {
+fn panic_message(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<&str>().copied();
-    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("a panic without words")
+    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("a panic without a message")
 }
 
-/// Panics inside calls are reported by status and not printed; others go to the previous panic hook.
-fn keep_quiet() {
+/// Keeps panics inside calls, which are reported by status, from being printed; others go to the previous panic hook.
+fn silence_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         let before = std::panic::take_hook();
@@ -163,33 +161,33 @@ mod tests {
     use super::*;
     use std::ffi::CStr;
 
-    fn said() -> String {
+    fn last_message() -> String {
         // SAFETY: the text ends with a zero.
         unsafe { CStr::from_ptr(last_error()) }.to_str().unwrap().to_string()
     }
 
     #[test]
-    fn failures_and_panics_become_a_status_and_a_text() {
+    fn failures_and_panics_become_a_status_and_a_message() {
         assert_eq!(guard(|| Ok(())), FRZ_OK);
         assert_eq!(guard(|| Err(Failure::argument("n = 7 is not within 1 to 3"))), FRZ_ERROR_ARGUMENT);
-        assert_eq!(said(), "n = 7 is not within 1 to 3");
+        assert_eq!(last_message(), "n = 7 is not within 1 to 3");
         assert_eq!(guard(|| panic!("on {}", "purpose")), FRZ_ERROR_INTERNAL);
-        assert_eq!(said(), "internal error: on purpose");
+        assert_eq!(last_message(), "internal error: on purpose");
         assert_eq!(guard_value(3, || Err(Failure::argument("é".repeat(1000)))), 3);
-        assert_eq!(said(), "é".repeat(511));
+        assert_eq!(last_message(), "é".repeat(511));
         assert_eq!(guard(|| Err(Failure::argument("a\0b"))), FRZ_ERROR_ARGUMENT);
-        assert_eq!(said(), "a");
+        assert_eq!(last_message(), "a");
     }
 
     #[test]
     fn each_thread_has_its_own_last_error() {
         guard(|| Err(Failure::argument("mine")));
         let other = std::thread::spawn(|| {
-            let before = said();
+            let before = last_message();
             guard(|| Err(Failure::argument("theirs")));
-            (before, said())
+            (before, last_message())
         });
         assert_eq!(other.join().unwrap(), (String::new(), "theirs".to_string()));
-        assert_eq!(said(), "mine");
+        assert_eq!(last_message(), "mine");
     }
 }

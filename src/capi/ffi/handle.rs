@@ -19,9 +19,21 @@ pub(in crate::capi) trait HandleType {
     const TAG: u32;
 }
 
+/// Implements [`HandleType`] for an opaque struct: the type of its value, its name in messages, and its number, which no other kind has.
+macro_rules! handle {
+    ($handle:ident, $value:ty, $name:literal, $number:literal) => {
+        impl $crate::capi::ffi::handle::HandleType for $handle {
+            type Value = $value;
+            const NAME: &'static str = $name;
+            const TAG: u32 = 0x6672_7a00 + $number;
+        }
+    };
+}
+pub(in crate::capi) use handle;
+
 /// Tag of a destroyed handle, until its memory is reused.
 const GONE: u32 = 0xdead_0fff;
-/// Value of `users` while a handle is being changed.
+/// Value of `users` while a call changes the handle.
 const CHANGING: i32 = -1;
 
 /// A value behind a header that detects misuse; handles of all kinds begin with the tag.
@@ -37,7 +49,7 @@ pub(in crate::capi) struct Handle<T> {
 /// A handle that this call reads; other calls may read it at the same time.
 pub(in crate::capi) struct Reading<'a, T>(&'a Handle<T>);
 
-/// A handle that this call alone uses; a panic poisons it.
+/// A handle in exclusive use by this call; a panic poisons it.
 pub(in crate::capi) struct Changing<'a, T>(&'a Handle<T>);
 
 /// Moves a value into a new handle and gives it to the host.
@@ -57,7 +69,7 @@ pub(in crate::capi) unsafe fn give<N: HandleType>(out: *mut *mut N, value: N::Va
     Ok(())
 }
 
-/// Zeroes an output of a call unless it is NULL: outputs are 0 after every failure.
+/// Zeroes an output unless it is NULL, at the beginning of a call: outputs are 0 after every failure.
 ///
 /// # Safety
 /// `out` must be NULL or point to memory, aligned or not, for a value for which zero bytes are valid.
@@ -79,7 +91,7 @@ pub(in crate::capi) unsafe fn write_some<T>(out: *mut T, value: T) {
     }
 }
 
-/// Runs the work of a call that returns a value, which `out` receives; zeroes after a failure.
+/// Runs the work of a call and writes its value to `out`, which is zeroed after a failure.
 ///
 /// # Safety
 /// `out` must be NULL or point to memory for it.
@@ -106,7 +118,7 @@ pub(in crate::capi) fn required<T>(pointer: *mut T, name: &str) -> Outcome<*mut 
 ///
 /// # Safety
 /// The pointer must be NULL or point to a handle of any kind that was not destroyed, for `'a`.
-unsafe fn look<'a, N: HandleType>(pointer: *const N) -> Outcome<&'a Handle<N::Value>> {
+unsafe fn handle_of<'a, N: HandleType>(pointer: *const N) -> Outcome<&'a Handle<N::Value>> {
     let handle = pointer.cast::<Handle<N::Value>>();
     refuse(handle.is_null(), || format!("the {} is NULL", N::NAME))?;
     if !handle.is_aligned() {
@@ -127,13 +139,13 @@ unsafe fn look<'a, N: HandleType>(pointer: *const N) -> Outcome<&'a Handle<N::Va
 /// The pointer must be NULL or point to a handle of any kind that was not destroyed, for `'a`.
 pub(in crate::capi) unsafe fn read<'a, N: HandleType>(pointer: *const N) -> Outcome<Reading<'a, N::Value>> {
     // SAFETY: guaranteed by the caller.
-    let handle = unsafe { look(pointer) }?;
+    let handle = unsafe { handle_of(pointer) }?;
     let one_more = |users: i32| (users >= 0).then_some(users + 1);
     if handle.users.fetch_update(Ordering::Acquire, Ordering::Relaxed, one_more).is_err() {
         return Err(busy::<N>());
     }
     let reading = Reading(handle);
-    sound::<N>(handle)?;
+    check_not_poisoned::<N>(handle)?;
     Ok(reading)
 }
 
@@ -154,9 +166,9 @@ pub(in crate::capi) unsafe fn read_some<'a, N: HandleType>(
 /// As [`read`].
 pub(in crate::capi) unsafe fn change<'a, N: HandleType>(pointer: *mut N) -> Outcome<Changing<'a, N::Value>> {
     // SAFETY: guaranteed by the caller.
-    let handle = unsafe { look(pointer.cast_const()) }?;
+    let handle = unsafe { handle_of(pointer.cast_const()) }?;
     let changing = lock::<N>(handle)?;
-    sound::<N>(handle)?;
+    check_not_poisoned::<N>(handle)?;
     Ok(changing)
 }
 
@@ -169,8 +181,8 @@ pub(in crate::capi) unsafe fn destroy<N: HandleType>(pointer: *mut N) -> Outcome
     unsafe { destroy_whole::<N, N>(pointer, |_| Vec::new()) }
 }
 
-/// Destroys a handle whose value lends handles of its own, which its `Drop` must [`free`]; NULL is ignored. If any of them is in use, none
-/// is destroyed.
+/// Destroys a handle whose value owns other handles that it lends, which its `Drop` must [`free`]; NULL is ignored. If any of them is in
+/// use, none is destroyed.
 ///
 /// # Safety
 /// As [`destroy`], also for the lent handles.
@@ -182,10 +194,10 @@ pub(in crate::capi) unsafe fn destroy_whole<N: HandleType, P: HandleType>(
         return Ok(());
     }
     // SAFETY: guaranteed by the caller.
-    let handle = unsafe { look(pointer.cast_const()) }?;
+    let handle = unsafe { handle_of(pointer.cast_const()) }?;
     let whole = lock::<N>(handle)?;
     // SAFETY: they live as long as the value.
-    let take = |part: &*mut P| lock::<P>(unsafe { look(part.cast_const()) }?);
+    let take = |part: &*mut P| lock::<P>(unsafe { handle_of(part.cast_const()) }?);
     let parts = lent(&whole).iter().map(take).collect::<Outcome<Vec<Changing<'_, P::Value>>>>()?;
     // None of them is in use now, and none can be used again.
     std::mem::forget((whole, parts));
@@ -222,7 +234,7 @@ fn busy<N: HandleType>() -> Failure {
     Failure::new(FRZ_ERROR_BUSY, format!("the {} is in use by another call", N::NAME))
 }
 
-fn sound<N: HandleType>(handle: &Handle<N::Value>) -> Outcome {
+fn check_not_poisoned<N: HandleType>(handle: &Handle<N::Value>) -> Outcome {
     if handle.poisoned.load(Ordering::Acquire) {
         let text = format!("the {} saw an internal error before and can only be destroyed", N::NAME);
         return Err(Failure::new(FRZ_ERROR_POISONED, text));
@@ -296,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn misuse_is_told() {
+    fn misuse_is_an_error() {
         let jar = jar(7);
         // SAFETY: the jar lives until it is destroyed.
         unsafe {
@@ -331,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lends_a_handle_in_use_stays_with_all_that_it_lends() {
+    fn an_owner_is_not_destroyed_while_a_handle_that_it_lends_is_in_use() {
         let lent = jar(7);
         let mut shelf: *mut Shelf = std::ptr::null_mut();
         // SAFETY: jar and shelf live until the shelf is destroyed.

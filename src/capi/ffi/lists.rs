@@ -1,6 +1,6 @@
-//! Arrays from a host: of handles, of structs, and of as many numbers as there are things.
+//! Arrays of handles, structs and numbers, from a host and to it.
 
-use super::guard::{Failure, Outcome, refuse};
+use super::guard::{Failure, Outcome, frz_status, guard, refuse};
 use super::handle::{HandleType, Reading, read, required};
 use super::views::{Plain, Sized32, check_size, frz_span, frz_view, sized};
 
@@ -19,8 +19,9 @@ pub(in crate::capi) unsafe fn read_each<'a, N: HandleType>(
     pointers.iter().map(|&pointer| unsafe { read(pointer) }).collect()
 }
 
-/// Replaces a list by the structs of a host's array, converted, all of one version; `nouns` name one and all of them in an error. Fields
-/// that the host's header does not have are 0. Nothing but the list is allocated, except on failure.
+/// Replaces the contents of `into` by the converted structs of a host's array, all of one version; `nouns` are the singular and the plural
+/// for error messages. Fields that the host's header does not have are 0. Only `into` may grow: nothing else is allocated, except on
+/// failure.
 ///
 /// # Safety
 /// `list` must be NULL or point to `count` structs.
@@ -45,7 +46,7 @@ pub(in crate::capi) unsafe fn read_list<T: Sized32, U>(
     Ok(())
 }
 
-/// The size (bytes) of the structs of a host's array, from each to the next; 0 if there are none. `first` tells of a failure of the first.
+/// The size (bytes) of each struct in a host's array; 0 if there are none. `first` adds to a failure that it is that of the first struct.
 ///
 /// # Safety
 /// `list` must be NULL or point to `count` structs.
@@ -61,16 +62,16 @@ pub(in crate::capi) unsafe fn stride_of<T: Sized32>(
     refuse(list.is_null(), || format!("{all}: the data is NULL, but the count is {count}"))?;
     // SAFETY: guaranteed by the caller: at least the size of one is there.
     let stride = unsafe { list.cast::<u32>().read_unaligned() } as usize;
-    // Checked before use.
+    // Before it is used as a stride.
     check_size::<T>(stride).map_err(first)?;
     let sizes = frz_view { data: list.cast(), count, stride };
-    // SAFETY: as above; the sizes must be equal for the structs to be contiguous.
+    // SAFETY: as above; the structs are contiguous only if their sizes are equal, and a different one ends the search.
     let is_other = unsafe { sizes.in_place::<u32>(all) }?.any(|size| size as usize != stride);
     refuse(is_other, || format!("{all}: their struct_size differs"))?;
     Ok(stride)
 }
 
-/// The elements of a view, one for each of `count` things; an error says that `there_are` so many, in the words before and after the count.
+/// The elements of a view, one for each of `count` things. If their number differs, the error says "... but `there_are` `count` `things`".
 ///
 /// # Safety
 /// The view must describe memory that can be read, for `'a`.
@@ -85,6 +86,18 @@ pub(in crate::capi) unsafe fn one_for_each<'a, T: Plain>(
     let len = given.len();
     refuse(len != count, || format!("{name}: {len} elements, but {there_are} {count} {things}"))?;
     Ok(given)
+}
+
+/// The body of an interface function that reports the number of elements, 0 after a failure, and may list them.
+///
+/// # Safety
+/// `count` must be NULL or valid.
+pub(in crate::capi) unsafe fn lists(count: *mut usize, work: impl FnOnce() -> Outcome) -> frz_status {
+    guard(|| {
+        // SAFETY: guaranteed by the caller.
+        unsafe { required(count, "count")?.write_unaligned(0) };
+        work()
+    })
 }
 
 /// Writes a list, or only the number of its elements if there is no memory for them.
@@ -103,7 +116,7 @@ pub(in crate::capi) unsafe fn list<T: Plain>(
     }
 }
 
-/// The numbers that a host's pointer points to.
+/// Reads an array of `N` numbers.
 ///
 /// # Safety
 /// The pointer must be NULL or point to `N` numbers.
@@ -113,7 +126,7 @@ pub(in crate::capi) unsafe fn numbers<const N: usize>(first: *const f64, name: &
     Ok(unsafe { first.cast::<[f64; N]>().read_unaligned() })
 }
 
-/// An index of one of `count` things that were set; `name` is that of the argument.
+/// Checks an index of one of the `count` things that a host has set; `name` is that of the argument.
 pub(in crate::capi) fn check_index(name: &str, index: usize, count: usize) -> Outcome<usize> {
     refuse(index >= count, || format!("{name} = {index} is none of the {count} that were set"))?;
     Ok(index)

@@ -1,4 +1,4 @@
-//! The C boundary itself: statuses, handles, views of a host's memory, saved states. Re-exports what every file of the interface needs.
+//! The C boundary itself: statuses, handles, views of a host's memory, saved states. Re-exports what most files of the interface need.
 
 // In the order of the header.
 pub(in crate::capi) mod guard;

@@ -11,10 +11,10 @@ use crate::capi::runtime::context::{enter, enter_light, frz_context};
 use crate::context::Context;
 use crate::error::{Error, Result};
 
-/// Memory of a host for a state, as its functions pass it: where it goes, how many bytes fit, and where the state's size is reported.
-pub(in crate::capi) type Room = (*mut c_void, usize, *mut usize);
+/// A host's buffer for a state: its memory, its capacity (bytes), and where the state's size is reported.
+pub(in crate::capi) type StateBuffer = (*mut c_void, usize, *mut usize);
 
-/// Writes bytes to the host, or reports how many there are: with `dst` NULL, `size` receives `bound`, an upper bound.
+/// Writes bytes to the host and their number to `size`. With `dst` NULL it only writes `bound`, an upper bound of their number.
 ///
 /// # Safety
 /// `dst` must be NULL or have room for `capacity` bytes; `size` must be NULL or point to a number.
@@ -27,15 +27,15 @@ pub(in crate::capi) unsafe fn write_bytes<B: AsRef<[u8]>>(
 ) -> Outcome {
     let size = required(size, "size")?;
     // SAFETY: guaranteed by the caller, and it is not NULL.
-    let tell = |count: usize| unsafe { size.write(count) };
-    tell(0);
+    let report_size = |count: usize| unsafe { size.write(count) };
+    report_size(0);
     if dst.is_null() {
-        tell(bound());
+        report_size(bound());
         return Ok(());
     }
     let bytes = bytes()?;
     let bytes = bytes.as_ref();
-    tell(bytes.len());
+    report_size(bytes.len());
     if capacity < bytes.len() {
         let text = format!("there is room for {capacity} bytes, {} are needed", bytes.len());
         return Err(Failure::new(FRZ_ERROR_CAPACITY, text));
@@ -56,15 +56,15 @@ impl Saved {
     }
 }
 
-/// An interface function that writes an object's state to the host, or reports its size, as [`write_bytes`] does. `parts` returns where a
-/// queried state is kept, and the object that `save` otherwise saves.
+/// The body of an interface function that writes an object's state to the host, or reports its size, as [`write_bytes`] does. `parts`
+/// returns the state kept from a query of its size, and the object that `save` saves if there is none.
 ///
 /// # Safety
 /// The pointers must be NULL or valid.
 pub(in crate::capi) unsafe fn saves<N: HandleType, T: Sync>(
     context: *mut frz_context,
     object: *const N,
-    (dst, capacity, size): Room,
+    (dst, capacity, size): StateBuffer,
     parts: impl FnOnce(&N::Value) -> (&Saved, &T),
     save: fn(&T) -> Vec<u8>,
 ) -> frz_status {
@@ -74,11 +74,11 @@ pub(in crate::capi) unsafe fn saves<N: HandleType, T: Sync>(
         required(size, "size")?;
         let call = enter(context)?;
         let object = read(object)?;
-        let (kept, whole) = parts(&object);
+        let (kept, object) = parts(&object);
         // No lock is held while the host's poll function runs.
         let bytes = match kept.take() {
             Some(bytes) => bytes,
-            None => call.ctx().phase("save", || Ok(save(whole)))?,
+            None => call.ctx().phase("save", || Ok(save(object)))?,
         };
         let written = write_bytes(dst, capacity, size, || bytes.len(), || Ok(bytes.as_slice()));
         if dst.is_null() || written.is_err() {
@@ -89,14 +89,14 @@ pub(in crate::capi) unsafe fn saves<N: HandleType, T: Sync>(
     })
 }
 
-/// An interface function that writes an object's state to the host in real time, or reports its size.
+/// The body of an interface function that writes an object's state to the host in real time, or reports its size.
 ///
 /// # Safety
 /// The pointers must be NULL or valid.
 pub(in crate::capi) unsafe fn saves_in_place<N: HandleType>(
     context: *mut frz_context,
     object: *const N,
-    (dst, capacity, size): Room,
+    (dst, capacity, size): StateBuffer,
     needed: impl FnOnce(&N::Value) -> usize,
     save_to: impl FnOnce(&N::Value, &mut [u8]) -> Result<usize>,
 ) -> frz_status {
@@ -119,7 +119,7 @@ pub(in crate::capi) unsafe fn saves_in_place<N: HandleType>(
     })
 }
 
-/// An interface function that replaces an object's state in real time by one of `bytes` bytes.
+/// The body of an interface function that replaces an object's state in real time by a saved one.
 ///
 /// # Safety
 /// The pointers must be NULL or valid.
@@ -139,15 +139,28 @@ pub(in crate::capi) unsafe fn restores<N: HandleType>(
     })
 }
 
-/// Resumes from a saved state of a `noun`, which has `unpacked` bytes when unpacked.
-pub(in crate::capi) fn resumed<T: Send>(
+/// A host's saved state, and its size (bytes); NULL: there is none.
+pub(in crate::capi) type Restart = (*const c_void, usize);
+
+/// Resumes a `noun` from a saved state, or makes a `new` one without a state. `unpacked` is the size (bytes) of a state once unpacked.
+///
+/// # Safety
+/// The pointer must be NULL or point to that many bytes.
+pub(in crate::capi) unsafe fn new_or_resumed<T: Send>(
     ctx: &Context,
     noun: &str,
-    unpacked: u64,
-    resume: impl FnOnce() -> Result<T> + Send,
+    (restart, bytes): Restart,
+    new: impl FnOnce() -> Outcome<T>,
+    unpacked: fn(&[u8]) -> u64,
+    resume: impl FnOnce(&[u8]) -> Result<T> + Send,
 ) -> Outcome<T> {
-    ctx.allow(&format!("the saved state of {noun}"), unpacked.saturating_mul(3))?;
-    ctx.phase("unpack", resume).map_err(|error| match error {
+    // SAFETY: guaranteed by the caller.
+    let state = unsafe { frz_view::packed(restart, bytes).elements::<u8>("restart") }?;
+    if restart.is_null() {
+        return new();
+    }
+    ctx.allow(&format!("the saved state of {noun}"), unpacked(&state).saturating_mul(3))?;
+    ctx.phase("unpack", || resume(&state)).map_err(|error| match error {
         Error::Bytes(what) => {
             let what = what.strip_prefix("the state ").unwrap_or(&what);
             Failure::new(FRZ_ERROR_FILE, format!("the saved state {what}"))

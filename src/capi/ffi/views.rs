@@ -38,7 +38,6 @@ pub struct frz_span {
 /// Every bit pattern must be valid.
 pub(in crate::capi) unsafe trait Plain: Copy {}
 
-/// Numbers are plain.
 macro_rules! plain {
     ($($number:ty)*) => {
         // SAFETY: every bit pattern is a number.
@@ -55,9 +54,9 @@ unsafe impl<T> Plain for *const T {}
 unsafe impl Plain for frz_view {}
 
 /// Maximum memory that one array may span (bytes): the largest pointer offset.
-const MOST: usize = isize::MAX as usize;
+const MAX_SPAN: usize = isize::MAX as usize;
 
-/// Bytes between elements; an error if pointers cannot reach all of them.
+/// Bytes from one element to the next; an error if the array is NULL, overlaps itself or exceeds the address space.
 fn stride<T>(name: &str, data: *const c_void, count: usize, stride: usize) -> Outcome<usize> {
     let size = size_of::<T>();
     let stride = if stride == 0 { size } else { stride };
@@ -65,7 +64,7 @@ fn stride<T>(name: &str, data: *const c_void, count: usize, stride: usize) -> Ou
         format!("{name}: the stride of {stride} bytes is less than an element's {size}")
     })?;
     let span = (count.max(1) - 1).checked_mul(stride).and_then(|bytes| bytes.checked_add(size));
-    refuse(span.is_none_or(|span| span > MOST || (data as usize).checked_add(span).is_none()), || {
+    refuse(span.is_none_or(|span| span > MAX_SPAN || (data as usize).checked_add(span).is_none()), || {
         format!("{name}: {count} elements of {stride} bytes are more than a memory holds")
     })?;
     refuse(data.is_null() && count > 0, || format!("{name}: the data is NULL, but the count is {count}"))?;
@@ -172,7 +171,7 @@ impl frz_span {
         Ok(())
     }
 
-    /// As [`frz_span::fill`], from an iterator that does not say how many there are.
+    /// As [`frz_span::fill`], from an iterator of unknown length.
     ///
     /// # Safety
     /// As [`frz_span::fill`].
@@ -211,7 +210,7 @@ impl frz_span {
         Ok(Some(unsafe { std::slice::from_raw_parts_mut(first, count) }))
     }
 
-    /// Reports the number of elements, and writes them unless the span's data are NULL.
+    /// Reports the number of elements, and writes them unless the span's data are NULL; `total` is that number, known without the elements.
     ///
     /// # Safety
     /// As [`frz_span::fill`]; `count` must be writable.
@@ -249,10 +248,18 @@ pub(in crate::capi) fn within(name: &str, value: f64, range: RangeInclusive<f64>
     })
 }
 
-/// The numbers of an enum of the interface, and what they mean.
+/// What each number of an enum of the interface stands for in the library.
 pub(in crate::capi) type Meanings<T, const N: usize> = [(u32, T); N];
 
-/// Maps a number of a host's enum to its value.
+/// Values of an enum of the interface with their numbers.
+macro_rules! numbered {
+    ($($value:ident),+) => {
+        [$(($value as u32, $value)),+]
+    };
+}
+pub(in crate::capi) use numbered;
+
+/// Looks up a number that a host gave for `name`, an argument or a field of the enum `kind`.
 pub(in crate::capi) fn meaning<T: Copy>(
     name: &str,
     kind: &str,
@@ -326,7 +333,7 @@ pub(in crate::capi) unsafe fn given_or_defaults<T: Sized32>(pointer: *const T) -
     if pointer.is_null() { Ok(T::defaults()) } else { unsafe { given(pointer) } }
 }
 
-/// Reads a host's struct over defaults, which fields that its header does not have keep.
+/// A host's struct; fields that its header does not have are those of `defaults`.
 ///
 /// # Safety
 /// The pointer must be NULL or point to a struct of the size that its struct_size states.
@@ -356,10 +363,10 @@ pub(in crate::capi) unsafe fn sized<T: Sized32>(pointer: *const T, mut defaults:
     Ok(defaults)
 }
 
-/// Fills a host's struct with the fields that its header has.
+/// Fills a host's struct with the fields that its header has. Its size is `size`, or that which the struct states.
 ///
 /// # Safety
-/// The pointer must be NULL or have room for as many bytes as the struct, or `size`, states.
+/// The pointer must be NULL or have room for that many bytes.
 pub(in crate::capi) unsafe fn fill<T: Sized32>(pointer: *mut T, size: Option<usize>, value: T) -> Outcome {
     let pointer = super::handle::required(pointer, T::NAME)?;
     // SAFETY: guaranteed by the caller.
@@ -378,7 +385,7 @@ pub(in crate::capi) unsafe fn fill<T: Sized32>(pointer: *mut T, size: Option<usi
     Ok(())
 }
 
-/// Runs the work of a call that returns a report, which is written to the host unless the pointer is NULL; all zeroes after a failure.
+/// Runs the work of a call and writes its report to the host unless the pointer is NULL; all zeroes after a failure.
 ///
 /// # Safety
 /// As [`fill`], without a size.
@@ -397,11 +404,11 @@ pub(in crate::capi) unsafe fn reports<T: Sized32, R: Into<T>>(
 }
 
 /// Maximum size (bytes) accepted for a struct of a newer header.
-const LARGEST: usize = 4096;
+const MAX_STRUCT_SIZE: usize = 4096;
 
 /// Refuses a size that no version of a struct has.
 pub(in crate::capi) fn check_size<T: Sized32>(size: usize) -> Outcome {
-    let known = T::SIZES.contains(&size) || (size > size_of::<T>() && size <= LARGEST);
+    let known = T::SIZES.contains(&size) || (size > size_of::<T>() && size <= MAX_STRUCT_SIZE);
     if !known {
         let text = format!("{}: struct_size = {size} is that of no version", T::NAME);
         return Err(Failure::new(FRZ_ERROR_VERSION, text));

@@ -38,11 +38,11 @@ fn options(compression: u32, flags: u32) -> Outcome<WriteOptions> {
     Ok(WriteOptions { compression, half: flags & FRZ_HALF != 0, ..WriteOptions::default() })
 }
 
-/// Grids of a host's array, with different names.
+/// The grids of a host's array, whose names must differ.
 ///
 /// # Safety
 /// `grids` must be NULL or point to `count` pointers to grids.
-unsafe fn several<'a>(grids: *const *const frz_grid, count: usize) -> Outcome<Vec<Reading<'a, Grid>>> {
+unsafe fn read_grids<'a>(grids: *const *const frz_grid, count: usize) -> Outcome<Vec<Reading<'a, Grid>>> {
     // SAFETY: guaranteed by the caller.
     let grids = unsafe { read_each(grids, count, "grids") }?;
     refuse(grids.is_empty(), || "grids: there is none")?;
@@ -54,7 +54,7 @@ unsafe fn several<'a>(grids: *const *const frz_grid, count: usize) -> Outcome<Ve
     Ok(grids)
 }
 
-/// An interface function that reads a grid from a file.
+/// The body of an interface function that reads a grid from a file.
 ///
 /// # Safety
 /// The pointers must be NULL or valid.
@@ -123,7 +123,7 @@ pub unsafe extern "C" fn frz_grid_save(
         let ctx = call.ctx();
         let path = Path::new(required_text(path, "path")?);
         let options = options(compression, flags)?;
-        let grids = several(grids, count)?;
+        let grids = read_grids(grids, count)?;
         let list: Vec<GridRef<'_>> = grids.iter().map(|grid| grid.any()).collect();
         Ok(ctx.phase_in_place("write", || file::write_any(path, &list, &options))?)
     })
@@ -186,7 +186,7 @@ pub unsafe extern "C" fn frz_grid_to_bytes(
         let call = enter(context)?;
         let ctx = call.ctx();
         let options = options(compression, flags)?;
-        let grids = several(grids, count)?;
+        let grids = read_grids(grids, count)?;
         let list: Vec<GridRef<'_>> = grids.iter().map(|grid| grid.any()).collect();
         let bound = || list.iter().map(|grid| grid.file_bound() as usize).sum();
         let bytes = || Ok(ctx.phase("write", || file::any_to_bytes(&list, &options))?);

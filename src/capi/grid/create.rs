@@ -4,7 +4,8 @@ use std::collections::HashSet;
 use std::ffi::c_char;
 
 use super::leaves::{check_origin, frz_leaf, frz_vector_leaf};
-use super::sparse::{CLASSES, check_voxel, frz_grid, frz_value_type, set_name};
+use super::sparse::frz_value_type::*;
+use super::sparse::{CLASSES, check_voxel, frz_grid, set_name};
 use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::capi::runtime::context::{creates, frz_context};
@@ -42,17 +43,9 @@ pub struct frz_grid_desc {
     pub vector_leaves: *const frz_vector_leaf,
 }
 
-// SAFETY: numbers and pointers.
-unsafe impl Sized32 for frz_grid_desc {
-    const SIZES: &'static [usize] = &[
-        std::mem::offset_of!(frz_grid_desc, name),
-        std::mem::offset_of!(frz_grid_desc, value_type),
-        size_of::<Self>(),
-    ];
-    const NAME: &'static str = "frz_grid_desc";
-}
+sized32!(frz_grid_desc, [name, value_type]);
 
-/// Makes edits of a host's leaves, whose origins are multiples of 8, each used once. A failure names the leaf.
+/// Converts a host's leaves to edits; origins must be multiples of 8, and different. A failure names the leaf.
 ///
 /// # Safety
 /// `list` must be NULL or point to `count` leaves.
@@ -83,46 +76,46 @@ fn check_values(values: &[f32]) -> Outcome {
     Err(Failure::argument("a value is not finite"))
 }
 
-/// What a pointer of a leaf points to.
+/// Copies the array of a leaf that a pointer points to.
 ///
 /// # Safety
 /// The pointer must be valid.
-unsafe fn lent<T: Plain>(pointer: *const T, name: &str) -> Outcome<T> {
+unsafe fn array_at<T: Plain>(pointer: *const T, name: &str) -> Outcome<T> {
     // SAFETY: guaranteed by the caller.
     Ok(unsafe { frz_view::packed(pointer, 1).elements::<T>(name) }?[0])
 }
 
-/// The leaves of a description as blocks.
+/// The leaves of floats of a description as edits.
 ///
 /// # Safety
 /// The description must describe memory that can be read.
-unsafe fn blocks(desc: &frz_grid_desc, class: GridClass) -> Outcome<Vec<BlockEdit>> {
-    let block = |&frz_leaf { origin, tile, values, mask }: &frz_leaf| {
+unsafe fn float_edits(desc: &frz_grid_desc, class: GridClass) -> Outcome<Vec<BlockEdit>> {
+    let edit = |&frz_leaf { origin, tile, values, mask }: &frz_leaf| {
         if values.is_null() {
             check_values(&[tile])?;
             return Ok(BlockEdit::Constant(origin, tile));
         }
         // SAFETY: guaranteed by the caller.
-        let values: Box<Values> = Box::new(unsafe { lent(values.cast(), "values") }?);
+        let values: Box<Values> = Box::new(unsafe { array_at(values.cast(), "values") }?);
         check_values(&*values)?;
-        let band = |index: usize| class != GridClass::LevelSet || values[index].abs() < desc.background;
-        let near = |x: usize| (0..64).fold(0, |word, at| word | u64::from(band(x << 6 | at)) << at);
+        let is_active = |index: usize| class != GridClass::LevelSet || values[index].abs() < desc.background;
+        let word = |x: usize| (0..64).fold(0, |word, at| word | u64::from(is_active(x << 6 | at)) << at);
         let mask = match mask.is_null() {
-            true => std::array::from_fn(near),
+            true => std::array::from_fn(word),
             // SAFETY: guaranteed by the caller.
-            false => unsafe { lent(mask.cast(), "mask") }?,
+            false => unsafe { array_at(mask.cast(), "mask") }?,
         };
         Ok(BlockEdit::Dense(Block { origin, values, mask }))
     };
     // SAFETY: guaranteed by the caller.
-    unsafe { edits((desc.leaves, desc.leaf_count, "leaves"), |leaf| leaf.origin, block) }
+    unsafe { edits((desc.leaves, desc.leaf_count, "leaves"), |leaf| leaf.origin, edit) }
 }
 
 /// A grid of floats from its description.
 ///
 /// # Safety
-/// As [`blocks`].
-unsafe fn of_floats(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> Outcome<FloatGrid> {
+/// As [`float_edits`].
+unsafe fn float_grid(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> Outcome<FloatGrid> {
     refuse(
         !desc.vector_leaves.is_null() || desc.background_vector != [0.0; 3],
         || "vector_leaves and background_vector are those of a grid of vectors: value_type says floats",
@@ -135,11 +128,11 @@ unsafe fn of_floats(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> Ou
     refuse(class == GridClass::Staggered, || "grid_class: floats are not staggered, vectors are")?;
     ctx.allow("a grid", (desc.leaf_count as u64).saturating_mul((VOXELS * 8 + 64) as u64))?;
     // SAFETY: guaranteed by the caller.
-    let blocks = unsafe { blocks(desc, class) }?;
+    let edits = unsafe { float_edits(desc, class) }?;
     let mut grid = FloatGrid::new(desc.voxel_size, desc.background)?;
     grid.set_class(class)?;
     Ok(ctx.polled(|| {
-        grid.replace_blocks(ctx, &blocks)?;
+        grid.replace_blocks(ctx, &edits)?;
         if class == GridClass::LevelSet && grid.leaf_count() > 0 {
             grid.flood_fill()?;
         }
@@ -151,7 +144,7 @@ unsafe fn of_floats(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> Ou
 ///
 /// # Safety
 /// The description must describe memory that can be read.
-unsafe fn of_vectors(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> Outcome<VectorGrid> {
+unsafe fn vector_grid(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> Outcome<VectorGrid> {
     refuse(
         !desc.leaves.is_null() || desc.background != 0.0,
         || "leaves and background are those of a grid of floats: value_type says vectors",
@@ -165,7 +158,7 @@ unsafe fn of_vectors(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> O
     let bytes = (VOXELS * 2 * size_of::<[f32; 3]>() + 64) as u64;
     ctx.allow("a grid", (desc.leaf_count as u64).saturating_mul(bytes))?;
     // SAFETY: guaranteed by the caller.
-    let edits = unsafe { vectors(desc) }?;
+    let edits = unsafe { vector_edits(desc) }?;
     let mut grid = VectorGrid::new(desc.voxel_size, desc.background_vector)?;
     grid.set_class(class)?;
     Ok(ctx.polled(|| {
@@ -174,25 +167,46 @@ unsafe fn of_vectors(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> O
     })?)
 }
 
-/// The leaves of a description as edits.
+/// The leaves of vectors of a description as edits.
 ///
 /// # Safety
-/// As [`blocks`].
-unsafe fn vectors(desc: &frz_grid_desc) -> Outcome<Vec<VectorEdit>> {
+/// As [`float_edits`].
+unsafe fn vector_edits(desc: &frz_grid_desc) -> Outcome<Vec<VectorEdit>> {
     let edit = |&frz_vector_leaf { origin, tile, values, mask }: &frz_vector_leaf| {
         if values.is_null() {
             check_values(&tile)?;
             return Ok(VectorEdit::Constant(origin, tile));
         }
         // SAFETY: guaranteed by the caller.
-        let values: Box<Vectors> = Box::new(unsafe { lent(values.cast(), "values") }?);
+        let values: Box<Vectors> = Box::new(unsafe { array_at(values.cast(), "values") }?);
         check_values(values.as_flattened())?;
         // SAFETY: guaranteed by the caller.
-        let mask = if mask.is_null() { [u64::MAX; DIM] } else { unsafe { lent(mask.cast(), "mask") }? };
+        let mask = if mask.is_null() { [u64::MAX; DIM] } else { unsafe { array_at(mask.cast(), "mask") }? };
         Ok(VectorEdit::Dense { origin, values, mask })
     };
     // SAFETY: guaranteed by the caller.
     unsafe { edits((desc.vector_leaves, desc.leaf_count, "vector_leaves"), |leaf| leaf.origin, edit) }
+}
+
+/// A grid from its description.
+///
+/// # Safety
+/// The description must describe memory that can be read.
+unsafe fn grid_of(ctx: &Context, desc: &frz_grid_desc) -> Outcome<AnyGrid> {
+    // SAFETY: guaranteed by the caller.
+    unsafe {
+        no_flags(desc.flags, 0)?;
+        let class = meaning("grid_class", "frz_grid_class", desc.grid_class, &CLASSES)?;
+        check_voxel(desc.voxel_size)?;
+        let name = text(desc.name, "name")?.unwrap_or("");
+        let known = numbered! { FRZ_VALUE_FLOAT, FRZ_VALUE_VECTOR };
+        let mut grid = match meaning("value_type", "frz_value_type", desc.value_type, &known)? {
+            FRZ_VALUE_FLOAT => AnyGrid::Floats(float_grid(ctx, desc, class)?),
+            FRZ_VALUE_VECTOR => AnyGrid::Vectors(vector_grid(ctx, desc, class)?),
+        };
+        set_name(&mut grid, name)?;
+        Ok(grid)
+    }
 }
 
 /// Creates a grid from blocks of voxels, which are copied.
@@ -208,21 +222,5 @@ pub unsafe extern "C" fn frz_grid_create(
     out: *mut *mut frz_grid,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    unsafe {
-        creates(context, out, |ctx| {
-            let desc = given(desc)?;
-            no_flags(desc.flags, 0)?;
-            let class = meaning("grid_class", "frz_grid_class", desc.grid_class, &CLASSES)?;
-            check_voxel(desc.voxel_size)?;
-            let name = text(desc.name, "name")?.unwrap_or("");
-            let known =
-                [frz_value_type::FRZ_VALUE_FLOAT, frz_value_type::FRZ_VALUE_VECTOR].map(|t| (t as u32, t));
-            let mut grid = match meaning("value_type", "frz_value_type", desc.value_type, &known)? {
-                frz_value_type::FRZ_VALUE_FLOAT => AnyGrid::Floats(of_floats(ctx, &desc, class)?),
-                frz_value_type::FRZ_VALUE_VECTOR => AnyGrid::Vectors(of_vectors(ctx, &desc, class)?),
-            };
-            set_name(&mut grid, name)?;
-            Ok(grid)
-        })
-    }
+    unsafe { creates(context, out, |ctx| grid_of(ctx, &given(desc)?)) }
 }

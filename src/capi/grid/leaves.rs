@@ -41,14 +41,15 @@ pub struct frz_vector_leaf {
 // SAFETY: numbers and pointers, which are followed only under the host's guarantee.
 unsafe impl Plain for frz_vector_leaf {}
 
-/// Maximum distance of a leaf's voxels from the origin.
-const FARTHEST: i32 = 1 << 30;
+/// Maximum coordinate of a block's origin (voxels), in absolute value.
+const MAX_ORIGIN: i32 = 1 << 30;
 
-/// Checks the origin of a block.
+/// Checks that the origin of a block is a multiple of 8, and in range.
 pub(in crate::capi) fn check_origin(origin: Origin) -> Outcome<Origin> {
-    refuse(origin.iter().any(|&index| index & 7 != 0 || !(-FARTHEST..=FARTHEST).contains(&index)), || {
-        format!("origin {origin:?} is not a block's: multiples of 8 within -2^30 to 2^30")
-    })?;
+    refuse(
+        origin.iter().any(|&index| index & 7 != 0 || !(-MAX_ORIGIN..=MAX_ORIGIN).contains(&index)),
+        || format!("origin {origin:?} is not a block's: multiples of 8 within -2^30 to 2^30"),
+    )?;
     Ok(origin)
 }
 
@@ -64,15 +65,15 @@ impl frz_vector_leaf {
     }
 }
 
-/// The value of a tile, or where the values and the mask of a leaf are.
-fn lent<V, T: Copy + Default>(probe: &Probe<'_, V, T>) -> (T, *const f32, *const u64) {
+/// The contents of a block: the value of a tile and NULLs, or pointers to the values and the mask of a leaf.
+fn contents<V, T: Copy + Default>(probe: &Probe<'_, V, T>) -> (T, *const f32, *const u64) {
     match probe {
         Probe::Leaf(leaf) => (T::default(), std::ptr::from_ref(leaf.values).cast(), leaf.mask.as_ptr()),
         Probe::Tile { value, .. } => (*value, std::ptr::null(), std::ptr::null()),
     }
 }
 
-/// Origins of blocks, checked.
+/// A host's origins of blocks, checked.
 ///
 /// # Safety
 /// The view must describe memory that can be read.
@@ -100,16 +101,14 @@ pub unsafe extern "C" fn frz_grid_leaves(
     count: *mut usize,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    guard(|| unsafe {
-        let count = required(count, "count")?;
-        count.write(0);
-        let held = read(grid)?;
-        let grid = held.floats()?;
-        dst.list(count, grid.leaf_count(), || {
-            let leaf = |leaf: Leaf<'_, _>| frz_leaf::of(leaf.origin, lent(&Probe::Leaf(leaf)));
-            Ok(grid.leaves()?.into_iter().map(leaf).collect())
+    unsafe {
+        lists(count, || {
+            let held = read(grid)?;
+            let grid = held.floats()?;
+            let leaf = |leaf: Leaf<'_, _>| frz_leaf::of(leaf.origin, contents(&Probe::Leaf(leaf)));
+            dst.list(count, grid.leaf_count(), || Ok(grid.leaves()?.into_iter().map(leaf).collect()))
         })
-    })
+    }
 }
 
 /// Lends the leaves of a grid of floats at given origins, or the value that all 512 voxels there have.
@@ -129,7 +128,7 @@ pub unsafe extern "C" fn frz_grid_probe(
         let held = read(grid)?;
         let origins = origins_of(&origins)?;
         let probes = held.floats()?.probe(&origins)?;
-        dst.put("dst", origins.iter().zip(&probes).map(|(&at, probe)| frz_leaf::of(at, lent(probe))))
+        dst.put("dst", origins.iter().zip(&probes).map(|(&at, probe)| frz_leaf::of(at, contents(probe))))
     })
 }
 
@@ -149,16 +148,14 @@ pub unsafe extern "C" fn frz_grid_vector_leaves(
     count: *mut usize,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    guard(|| unsafe {
-        let count = required(count, "count")?;
-        count.write(0);
-        let held = read(grid)?;
-        let grid = held.vectors()?;
-        dst.list(count, grid.leaf_count(), || {
-            let leaf = |leaf: Leaf<'_, _>| frz_vector_leaf::of(leaf.origin, lent(&Probe::Leaf(leaf)));
-            Ok(grid.leaves()?.into_iter().map(leaf).collect())
+    unsafe {
+        lists(count, || {
+            let held = read(grid)?;
+            let grid = held.vectors()?;
+            let leaf = |leaf: Leaf<'_, _>| frz_vector_leaf::of(leaf.origin, contents(&Probe::Leaf(leaf)));
+            dst.list(count, grid.leaf_count(), || Ok(grid.leaves()?.into_iter().map(leaf).collect()))
         })
-    })
+    }
 }
 
 /// Lends the leaves of a grid of vectors at given origins, or the value that all 512 voxels there have.
@@ -179,6 +176,9 @@ pub unsafe extern "C" fn frz_grid_vector_probe(
         let grid = held.vectors()?;
         let origins = origins_of(&origins)?;
         let probes = grid.probe(&origins)?;
-        dst.put("dst", origins.iter().zip(&probes).map(|(&at, probe)| frz_vector_leaf::of(at, lent(probe))))
+        dst.put(
+            "dst",
+            origins.iter().zip(&probes).map(|(&at, probe)| frz_vector_leaf::of(at, contents(probe))),
+        )
     })
 }

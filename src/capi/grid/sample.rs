@@ -1,4 +1,4 @@
-//! Grids as numbers and meshes: samples, and triangle meshes of their surface.
+//! Samples of grids, and triangle meshes of their surfaces.
 
 use std::ffi::c_char;
 
@@ -29,7 +29,7 @@ fn sampling_of(sampling: u32) -> Outcome<bool> {
     meaning("sampling", "frz_sampling", sampling, &known)
 }
 
-/// Positions (m), all finite.
+/// A host's positions (m), all finite.
 ///
 /// # Safety
 /// The view must describe memory that can be read.
@@ -40,10 +40,10 @@ unsafe fn positions_of(positions: &frz_view) -> Outcome<Vec<DVec3>> {
 }
 
 /// Number of positions sampled at once: between batches a cancel takes effect and progress is known.
-const PIECE: usize = 1 << 16;
+const BATCH: usize = 1 << 16;
 
 /// Values at positions (m), batch by batch.
-fn in_pieces<T: Clone + Send>(
+fn in_batches<T: Clone + Send>(
     ctx: &Context,
     positions: &[DVec3],
     sample: impl Fn(&[DVec3]) -> Result<Vec<T>> + Send + Sync,
@@ -51,11 +51,11 @@ fn in_pieces<T: Clone + Send>(
     let bytes = size_of::<DVec3>() + size_of::<T>();
     ctx.allow("the samples", (positions.len() as u64).saturating_mul(bytes as u64))?;
     Ok(ctx.phase("sample", || {
-        ctx.expect(positions.len().div_ceil(PIECE));
+        ctx.expect(positions.len().div_ceil(BATCH));
         let mut out = Vec::with_capacity(positions.len());
-        for piece in positions.chunks(PIECE) {
+        for batch in positions.chunks(BATCH) {
             ctx.check()?;
-            out.extend(sample(piece)?);
+            out.extend(sample(batch)?);
             ctx.advance();
         }
         Ok(out)
@@ -64,11 +64,11 @@ fn in_pieces<T: Clone + Send>(
 
 fn sampled(ctx: &Context, grid: &FloatGrid, positions: &[DVec3], sampling: u32) -> Outcome<Vec<f32>> {
     let linear = sampling_of(sampling)?;
-    in_pieces(ctx, positions, |piece| {
+    in_batches(ctx, positions, |batch| {
         let mut values = Vec::new();
         match linear {
-            false => grid.sample_nearest(ctx, piece, &mut values)?,
-            true => grid.sample_linear(ctx, piece, &mut values)?,
+            false => grid.sample_nearest(ctx, batch, &mut values)?,
+            true => grid.sample_linear(ctx, batch, &mut values)?,
         }
         Ok(values)
     })
@@ -81,7 +81,7 @@ fn sampled_vectors(
     sampling: u32,
 ) -> Outcome<Vec<[f32; 3]>> {
     let linear = sampling_of(sampling)?;
-    in_pieces(ctx, positions, |piece| grid.sample(ctx, piece, linear))
+    in_batches(ctx, positions, |batch| grid.sample(ctx, batch, linear))
 }
 
 /// Samples a grid of floats at world positions.
@@ -173,7 +173,7 @@ pub unsafe extern "C" fn frz_grid_sample_mesh(
 /// Memory (bytes) for each leaf while a mesh is made.
 const BYTES_PER_LEAF: u64 = 6000;
 
-/// An interface function that makes a mesh from a grid.
+/// The body of an interface function that makes a mesh from a grid.
 ///
 /// # Safety
 /// The pointers must be NULL or valid.

@@ -1,4 +1,4 @@
-//! Sparse grids of floats, and what they share with grids of vectors.
+//! Sparse grids of floats or vectors: their handle, properties and names.
 
 use std::ffi::{c_char, c_void};
 use std::ptr::NonNull;
@@ -69,25 +69,17 @@ pub struct frz_grid_info {
     pub background_vector: [f32; 3],
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_grid_info {
-    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_grid_info, value_type), size_of::<Self>()];
-    const NAME: &'static str = "frz_grid_info";
-}
+sized32!(frz_grid_info, [value_type]);
 
 /// The value of a grid's handle.
 pub(in crate::capi) enum Grid {
     /// The host's own grid.
     Own(AnyGrid),
-    /// A part of another object, which keeps it alive and unchanged while it is read.
+    /// A grid of another object, which keeps it alive, and unchanged while it is read.
     Lent(NonNull<FloatGrid>),
 }
 
-impl HandleType for frz_grid {
-    type Value = Grid;
-    const NAME: &'static str = "grid";
-    const TAG: u32 = 0x6672_7a04;
-}
+handle!(frz_grid, Grid, "grid", 4);
 
 impl From<AnyGrid> for Grid {
     fn from(grid: AnyGrid) -> Self {
@@ -101,8 +93,8 @@ impl From<FloatGrid> for Grid {
     }
 }
 
-/// The error for a grid of a type that a function does not accept.
-fn of_another_kind(name: &str, holds: &str, needed: &str) -> Failure {
+/// The error for a grid whose values are not of the type that a function needs.
+fn wrong_value_type(name: &str, holds: &str, needed: &str) -> Failure {
     let name = if name.is_empty() { String::new() } else { format!(" \"{name}\"") };
     Failure::argument(format!("the grid{name} holds {holds}, but one of {needed} is needed"))
 }
@@ -112,7 +104,7 @@ impl Grid {
     pub(in crate::capi) fn any(&self) -> GridRef<'_> {
         match self {
             Self::Own(grid) => grid.borrow(),
-            // SAFETY: the owner changes it only while it holds this handle to change.
+            // SAFETY: the owner changes it only while it has locked this handle (`BaseHandle::with_grids_locked`).
             Self::Lent(grid) => GridRef::Floats(unsafe { grid.as_ref() }),
         }
     }
@@ -121,7 +113,7 @@ impl Grid {
     pub(in crate::capi) fn floats(&self) -> Outcome<&FloatGrid> {
         match self.any() {
             GridRef::Floats(grid) => Ok(grid),
-            GridRef::Vectors(grid) => Err(of_another_kind(&grid.name(), "vectors", "floats")),
+            GridRef::Vectors(grid) => Err(wrong_value_type(&grid.name(), "vectors", "floats")),
         }
     }
 
@@ -129,7 +121,7 @@ impl Grid {
     pub(in crate::capi) fn vectors(&self) -> Outcome<&VectorGrid> {
         match self.any() {
             GridRef::Vectors(grid) => Ok(grid),
-            GridRef::Floats(grid) => Err(of_another_kind(&grid.name(), "floats", "vectors")),
+            GridRef::Floats(grid) => Err(wrong_value_type(&grid.name(), "floats", "vectors")),
         }
     }
 
@@ -147,7 +139,7 @@ impl Grid {
     pub(in crate::capi) fn own_floats(&mut self) -> Outcome<&mut FloatGrid> {
         match self.own()? {
             AnyGrid::Floats(grid) => Ok(grid),
-            AnyGrid::Vectors(grid) => Err(of_another_kind(&grid.name(), "vectors", "floats")),
+            AnyGrid::Vectors(grid) => Err(wrong_value_type(&grid.name(), "vectors", "floats")),
         }
     }
 }

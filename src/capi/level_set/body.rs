@@ -15,12 +15,6 @@ use crate::motion::{Motion, between};
 use crate::snow::grains::Object;
 use crate::sweep::{Body, Shape};
 
-/// Flag of a body: its imprints have no noise.
-pub const FRZ_BODY_EXACT: u32 = 1;
-
-/// Flag of a body: frz_body.compression is the share of the snow it removes that becomes no grains.
-pub const FRZ_BODY_COMPRESSION: u32 = 2;
-
 /// A mesh that moves during a step. All arrays are lent for the duration of the call.
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -56,15 +50,13 @@ pub struct frz_body {
     pub compression: f64,
 }
 
-// SAFETY: numbers and pointers.
-unsafe impl Sized32 for frz_body {
-    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_body, friction), size_of::<Self>()];
-    const NAME: &'static str = "frz_body";
+sized32!(frz_body, [friction], Self { friction: 0.3, ..Self::zeroed() });
 
-    fn defaults() -> Self {
-        Self { friction: 0.3, ..Self::zeroed() }
-    }
-}
+/// Flag of a body: its imprints have no noise.
+pub const FRZ_BODY_EXACT: u32 = 1;
+
+/// Flag of a body: frz_body.compression is the share of the snow it removes that becomes no grains.
+pub const FRZ_BODY_COMPRESSION: u32 = 2;
 
 /// Fills a body with the defaults: no arrays, a friction of 0.3.
 ///
@@ -79,9 +71,9 @@ pub unsafe extern "C" fn frz_body_init(body: *mut frz_body, size: usize) -> frz_
 }
 
 /// Maximum number of poses between the beginning and the end of a step.
-const MOST_BETWEEN: usize = 4096;
+const MAX_BETWEEN: usize = 4096;
 
-/// Motion of a host's body: straight from pose to pose, the first at time 0, the last at the step's end.
+/// Motion of a host's body: linear from pose to pose, the first at time 0, the last at the step's end.
 struct HostMotion {
     triangles: Vec<[u32; 3]>,
     poses: Vec<Vec<Vec3>>,
@@ -90,7 +82,7 @@ struct HostMotion {
 }
 
 impl HostMotion {
-    /// Takes poses of all of the host's vertices; only those that triangles use count.
+    /// Takes poses of all of the host's vertices, and drops the vertices that no triangle uses.
     fn new(triangles: Vec<[u32; 3]>, mut poses: Vec<Vec<Vec3>>, end: f64) -> Self {
         let Some(used) = used(poses[0].len(), &triangles) else { return Self { triangles, poses, end } };
         for pose in &mut poses {
@@ -112,7 +104,7 @@ impl Motion for HostMotion {
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         let steps = self.poses.len() - 1;
         let at = if self.end > 0.0 { (time / self.end).clamp(0.0, 1.0) * steps as f64 } else { 0.0 };
-        // Times of poses come from divisions: rounding must not pull in the neighbouring pose.
+        // The times of poses are quotients: rounding must not mix in a neighbouring pose.
         let at = if (at - at.round()).abs() < 1e-9 { at.round() } else { at };
         let (first, part) = (at.floor() as usize, at - at.floor());
         between(&self.poses[first], &self.poses[(first + 1).min(steps)], part, out);
@@ -127,7 +119,7 @@ impl Motion for HostMotion {
 }
 
 /// A body from a host, checked.
-struct Arrived {
+struct HostBody {
     id: u64,
     exact: bool,
     surface: Surface,
@@ -182,18 +174,18 @@ pub(in crate::capi) unsafe fn bodies(
     finite("dt", dt)?;
     refuse(dt < 0.0, || format!("dt = {dt} is not 0 or more"))?;
     // SAFETY: guaranteed by the caller.
-    let arrived = unsafe { arrived(list, count, dt) }?;
+    let read_bodies = unsafe { read_bodies(list, count, dt) }?;
     if role != Role::Sweep {
-        for (at, body) in arrived.iter().enumerate() {
+        for (at, body) in read_bodies.iter().enumerate() {
             check_far(body).map_err(|failure| named(at, failure))?;
         }
     }
-    let bytes = arrived
+    let bytes = read_bodies
         .iter()
         .map(|body| body.poses.len() * body.poses[0].len() * 12 + body.mesh.corners.len() * 200);
     ctx.allow("the bodies", bytes.sum::<usize>() as u64)?;
     let known = &*shapes;
-    let make = |body: Arrived| {
+    let make = |body: HostBody| {
         ctx.check()?;
         ctx.advance();
         let motion = HostMotion::new(body.mesh.triangles(), body.poses, dt);
@@ -201,15 +193,15 @@ pub(in crate::capi) unsafe fn bodies(
         Ok((body.id, made.with_noise(!body.exact), body.surface))
     };
     let made: Vec<(u64, Body, Surface)> = ctx.phase("bodies", || {
-        ctx.expect(arrived.len());
-        arrived.into_par_iter().map(make).collect::<Result<_>>()
+        ctx.expect(read_bodies.len());
+        read_bodies.into_par_iter().map(make).collect::<Result<_>>()
     })?;
     made.iter().for_each(|(id, body, _)| warn(ctx, role, *id, body, shapes.get(id)));
     *shapes = made.iter().map(|(id, body, _)| (*id, body.shape().clone())).collect();
     Ok(made.into_iter().map(|(_, body, surface)| (body, surface)).collect())
 }
 
-/// Logs warnings about a body, once for each set of faces.
+/// Logs warnings about a body, once until its faces change.
 fn warn(ctx: &Context, role: Role, id: u64, body: &Body, known: Option<&Arc<Shape>>) {
     if known.is_some_and(|known| Arc::ptr_eq(known, body.shape())) {
         return;
@@ -222,7 +214,7 @@ fn warn(ctx: &Context, role: Role, id: u64, body: &Body, known: Option<&Arc<Shap
         ctx.warn(&format!("body {id}: the mesh has no inside: grains collide with both of its sides"));
         return;
     }
-    // For the air a step itself reports small holes, which are closed, and large ones, which are not.
+    // Steps of the air warn about holes themselves: they close only small ones.
     if role == Role::Bound {
         return;
     }
@@ -234,8 +226,8 @@ fn warn(ctx: &Context, role: Role, id: u64, body: &Body, known: Option<&Arc<Shap
     }
 }
 
-/// Refuses a body so far away that its speed could not be computed.
-fn check_far(body: &Arrived) -> Outcome {
+/// Refuses a body that is too far away for its speed to be computed.
+fn check_far(body: &HostBody) -> Outcome {
     let is_far = |pose: &[Vec3], vertex: u32| pose[vertex as usize].iter().any(|x| x.abs() > FARTHEST);
     let far_of =
         |pose: &Vec<Vec3>| body.mesh.corners.iter().copied().filter(|&vertex| is_far(pose, vertex)).min();
@@ -248,34 +240,37 @@ fn check_far(body: &Arrived) -> Outcome {
     }
 }
 
+/// Reads a host's bodies, whose ids must differ.
+///
 /// # Safety
 /// As [`bodies`].
-unsafe fn arrived(list: *const frz_body, count: usize, dt: f64) -> Outcome<Vec<Arrived>> {
+unsafe fn read_bodies(list: *const frz_body, count: usize, dt: f64) -> Outcome<Vec<HostBody>> {
     if count == 0 {
         return Ok(Vec::new());
     }
     required(list.cast_mut(), "bodies")?;
     // SAFETY: guaranteed by the caller.
     let stride = unsafe { stride_of(list, count, "bodies", |failure| named(0, failure)) }?;
-    let mut out: Vec<Arrived> = Vec::with_capacity(count);
+    let mut out: Vec<HostBody> = Vec::with_capacity(count);
     let mut ids = HashSet::with_capacity(count);
     for at in 0..count {
         // SAFETY: guaranteed by the caller.
-        let body = unsafe { one(list.byte_add(at * stride), dt) }.map_err(|failure| named(at, failure))?;
+        let body =
+            unsafe { read_body(list.byte_add(at * stride), dt) }.map_err(|failure| named(at, failure))?;
         refuse(!ids.insert(body.id), || format!("body {at}: another one has the id {} too", body.id))?;
         out.push(body);
     }
     Ok(out)
 }
 
-/// Names the body in a failure.
+/// Adds the body's index to a failure.
 fn named(at: usize, failure: Failure) -> Failure {
     Failure { text: format!("body {at}: {}", failure.text), ..failure }
 }
 
 /// # Safety
 /// As [`bodies`].
-unsafe fn one(body: *const frz_body, dt: f64) -> Outcome<Arrived> {
+unsafe fn read_body(body: *const frz_body, dt: f64) -> Outcome<HostBody> {
     // SAFETY: guaranteed by the caller.
     unsafe {
         let body = given(body)?;
@@ -286,8 +281,8 @@ unsafe fn one(body: *const frz_body, dt: f64) -> Outcome<Arrived> {
         let compression = has_compression.then_some(body.compression);
         within("compression", compression.unwrap_or(0.0), 0.0..=1.0, "")?;
         let surface = Surface { friction: body.friction, stick: body.stick, compression };
-        refuse(body.between_count > MOST_BETWEEN, || {
-            format!("between_count = {} is more than {MOST_BETWEEN}", body.between_count)
+        refuse(body.between_count > MAX_BETWEEN, || {
+            format!("between_count = {} is more than {MAX_BETWEEN}", body.between_count)
         })?;
         let mesh = polygons(&body.positions, &body.face_counts, &body.indices)?;
         let count = mesh.positions.len();
@@ -314,6 +309,6 @@ unsafe fn one(body: *const frz_body, dt: f64) -> Outcome<Arrived> {
             pose(&body.positions_end, "positions_end")?;
         }
         let exact = body.flags & FRZ_BODY_EXACT != 0;
-        Ok(Arrived { id: body.id, exact, surface, mesh, poses })
+        Ok(HostBody { id: body.id, exact, surface, mesh, poses })
     }
 }

@@ -63,14 +63,14 @@ pub struct frz_noise {
 
 impl frz_noise {
     /// The defaults for hosts.
-    pub(in crate::capi) const USUAL: Self = Self { amplitude: -1.0, size: -1.0, octaves: 3, seed: 0 };
+    pub(in crate::capi) const DEFAULTS: Self = Self { amplitude: -1.0, size: -1.0, octaves: 3, seed: 0 };
 
     /// The library's own parameters for voxels of a size (m); `None` for no noise.
     pub(in crate::capi) fn params(&self, cell: f64) -> Outcome<Option<NoiseParams>> {
         finite("noise amplitude", self.amplitude)?;
         finite("noise size", self.size)?;
         let defaults = NoiseParams::for_cell(cell);
-        let or = |value: f64, defaults: f64| if value == -1.0 { defaults } else { value };
+        let or = |value: f64, default: f64| if value == -1.0 { default } else { value };
         let params = NoiseParams {
             amplitude: or(self.amplitude, defaults.amplitude),
             size: or(self.size, defaults.size),
@@ -97,7 +97,7 @@ fn scheme_of(number: u32) -> Outcome<Scheme> {
     meaning("scheme", "frz_scheme", number, &known)
 }
 
-type Join = fn(&Context, &FloatGrid, &FloatGrid) -> Result<FloatGrid>;
+type Combine = fn(&Context, &FloatGrid, &FloatGrid) -> Result<FloatGrid>;
 type Filter = fn(&Context, &mut FloatGrid, u32, u32, Scheme) -> Result<()>;
 
 /// Refuses a grid that is not a level set, and warns if its values are not distances in metres.
@@ -109,7 +109,7 @@ fn level_set_of<'a>(ctx: &Context, grid: &'a FloatGrid) -> Outcome<&'a FloatGrid
     Ok(grid)
 }
 
-/// An interface function that changes a level set owned by the caller.
+/// The body of an interface function that changes a level set owned by the caller.
 ///
 /// # Safety
 /// The pointers must be NULL or handles that were not destroyed.
@@ -240,7 +240,7 @@ pub unsafe extern "C" fn frz_levelset_csg(
             let other = read(other)?;
             let second = level_set_of(ctx, other.floats()?)?;
             ctx.allow("the joined level sets", first.memory_bytes().saturating_add(second.memory_bytes()))?;
-            let known: [(u32, Join); 3] = [
+            let known: [(u32, Combine); 3] = [
                 (frz_csg::FRZ_CSG_UNION as u32, level_set::union_copy),
                 (frz_csg::FRZ_CSG_DIFFERENCE as u32, level_set::difference_copy),
                 (frz_csg::FRZ_CSG_INTERSECTION as u32, level_set::intersection_copy),
@@ -313,10 +313,8 @@ pub unsafe extern "C" fn frz_levelset_smooth(
     unsafe {
         changes(context, inout, |ctx, grid| {
             let scheme = scheme_of(scheme)?;
-            for (name, value, most) in [("width", width, 32), ("times", times, 1000)] {
-                refuse(!(1..=most).contains(&value), || {
-                    format!("{name} = {value} is not within 1 to {most}")
-                })?;
+            for (name, value, max) in [("width", width, 32), ("times", times, 1000)] {
+                refuse(!(1..=max).contains(&value), || format!("{name} = {value} is not within 1 to {max}"))?;
             }
             ctx.allow("the smoothed level set", grid.memory_bytes())?;
             let known: [(u32, Filter); 2] = [
@@ -394,7 +392,7 @@ pub unsafe extern "C" fn frz_levelset_sweep(
 /// Maximum distance of a sweep from its first vertex (voxels): the reach of the lattice, minus one block for its origin.
 const REACH: f64 = 131_064.0;
 
-/// Refuses bodies that move beyond the reach of a sweep's lattice, by their index.
+/// Refuses bodies that move beyond the reach of a sweep's lattice; the error names the first one by its index.
 fn check_reach(bodies: &[Body], dt: f64, voxel: f64) -> Result<()> {
     let mut pose = Vec::new();
     let mut first = None;

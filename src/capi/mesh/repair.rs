@@ -41,10 +41,7 @@ pub struct frz_repair_report {
     pub cell: f64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_repair_report {
-    const NAME: &'static str = "frz_repair_report";
-}
+sized32!(frz_repair_report);
 
 fields_of!(Prepared => frz_repair_report {
     joined_vertices, dropped_triangles, turned_triangles, turned_parts, holes, added_triangles

@@ -1,4 +1,4 @@
-//! Meshes.
+//! Polygon meshes with vertex attributes.
 
 use std::ffi::c_char;
 
@@ -47,11 +47,7 @@ pub struct frz_mesh_desc {
 // SAFETY: numbers and pointers; padding between fields is never read.
 unsafe impl Plain for frz_attribute {}
 
-// SAFETY: numbers and pointers.
-unsafe impl Sized32 for frz_mesh_desc {
-    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_mesh_desc, attributes), size_of::<Self>()];
-    const NAME: &'static str = "frz_mesh_desc";
-}
+sized32!(frz_mesh_desc, [attributes]);
 
 /// Properties of a mesh.
 #[repr(C)]
@@ -81,10 +77,7 @@ pub struct frz_mesh_info {
     pub volume: f64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_mesh_info {
-    const NAME: &'static str = "frz_mesh_info";
-}
+sized32!(frz_mesh_info);
 
 /// Arrays that frz_mesh_read copies.
 #[repr(u32)]
@@ -105,7 +98,7 @@ pub enum frz_mesh_part {
 /// The value of a mesh's handle.
 pub(in crate::capi) struct Mesh {
     polygons: PolygonMesh,
-    /// Its faces as triangles, triangulated once.
+    /// The triangles into which its faces are divided.
     pub triangles: TriMesh,
     attributes: Vec<Attribute>,
 }
@@ -116,13 +109,24 @@ struct Attribute {
     values: Vec<f32>,
 }
 
-impl HandleType for frz_mesh {
-    type Value = Mesh;
-    const NAME: &'static str = "mesh";
-    const TAG: u32 = 0x6672_7a03;
-}
+handle!(frz_mesh, Mesh, "mesh", 3);
 
 impl Mesh {
+    /// A mesh from its description.
+    ///
+    /// # Safety
+    /// The description must describe memory that can be read.
+    unsafe fn of_desc(ctx: &Context, desc: &frz_mesh_desc) -> Outcome<Self> {
+        no_flags(desc.flags, 0)?;
+        // SAFETY: guaranteed by the caller.
+        let polygons = unsafe { polygons(&desc.positions, &desc.face_counts, &desc.indices) }?;
+        ctx.allow("a mesh", (polygons.positions.len() + polygons.corners.len()) as u64 * 28)?;
+        // SAFETY: as above.
+        let attributes = unsafe { attributes(desc, polygons.positions.len()) }?;
+        let triangles = ctx.phase("triangles", || Ok(polygons.clone().into_triangles()))?;
+        Ok(Self { polygons, triangles, attributes })
+    }
+
     /// A mesh made by the library.
     pub(in crate::capi) fn of_triangles(triangles: TriMesh) -> Self {
         let mut polygons = PolygonMesh { positions: triangles.positions.clone(), ..PolygonMesh::default() };
@@ -130,7 +134,7 @@ impl Mesh {
         Self { polygons, triangles, attributes: Vec::new() }
     }
 
-    /// The values of an attribute with this number of components; `None` if there is none.
+    /// The values of an attribute; `None` if there is none with this name and number of components.
     pub(in crate::capi) fn attribute(&self, name: &str, components: usize) -> Option<&[f32]> {
         let is_it = |attribute: &&Attribute| attribute.name == name && attribute.components == components;
         self.attributes.iter().find(is_it).map(|attribute| &attribute.values[..])
@@ -236,22 +240,7 @@ pub unsafe extern "C" fn frz_mesh_create(
     out: *mut *mut frz_mesh,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    unsafe {
-        creates(context, out, |ctx| {
-            let desc = given(desc)?;
-            no_flags(desc.flags, 0)?;
-            let polygons = polygons(&desc.positions, &desc.face_counts, &desc.indices)?;
-            let bytes = (polygons.positions.len() + polygons.corners.len()) as u64 * 28;
-            ctx.allow("a mesh", bytes)?;
-            let attributes = attributes(&desc, polygons.positions.len())?;
-            made(ctx, polygons, attributes)
-        })
-    }
-}
-
-fn made(ctx: &Context, polygons: PolygonMesh, attributes: Vec<Attribute>) -> Outcome<Mesh> {
-    let triangles = ctx.phase("triangles", || Ok(polygons.clone().into_triangles()))?;
-    Ok(Mesh { polygons, triangles, attributes })
+    unsafe { creates(context, out, |ctx| Mesh::of_desc(ctx, &given(desc)?)) }
 }
 
 /// Refuses unknown flags.
@@ -354,14 +343,9 @@ pub unsafe extern "C" fn frz_mesh_read(mesh: *const frz_mesh, part: u32, dst: fr
     // SAFETY: the pointers are NULL or valid.
     guard(|| unsafe {
         let mesh = read(mesh)?;
-        let known = [
-            FRZ_MESH_POSITIONS,
-            FRZ_MESH_FACE_COUNTS,
-            FRZ_MESH_INDICES,
-            FRZ_MESH_TRIANGLES,
-            FRZ_MESH_NORMALS,
-        ]
-        .map(|part| (part as u32, part));
+        let known = numbered! {
+            FRZ_MESH_POSITIONS, FRZ_MESH_FACE_COUNTS, FRZ_MESH_INDICES, FRZ_MESH_TRIANGLES, FRZ_MESH_NORMALS
+        };
         match meaning("part", "frz_mesh_part", part, &known)? {
             FRZ_MESH_POSITIONS => triples(&dst, &mesh.polygons.positions),
             FRZ_MESH_NORMALS => triples(&dst, &mesh.triangles.normals()),

@@ -34,7 +34,7 @@ pub struct frz_progress {
 }
 
 /// Bytes of frz_progress in the header of interface 1.0.
-const FIRST_PROGRESS: usize = std::mem::offset_of!(frz_progress, fraction);
+const FIRST_PROGRESS_BYTES: usize = std::mem::offset_of!(frz_progress, fraction);
 
 /// The time that a phase took.
 #[repr(C)]
@@ -61,9 +61,9 @@ pub type frz_log_function = Option<unsafe extern "C" fn(user: *mut c_void, text:
 
 /// When the running call began.
 #[derive(Clone, Default)]
-struct Began(Arc<Mutex<Option<Instant>>>);
+struct CallStart(Arc<Mutex<Option<Instant>>>);
 
-impl Began {
+impl CallStart {
     fn set(&self, at: Option<Instant>) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = at;
     }
@@ -78,7 +78,7 @@ impl Began {
 unsafe impl Plain for frz_stage_time {}
 
 /// The value of a context's handle.
-pub(in crate::capi) struct State {
+pub(in crate::capi) struct ContextHandle {
     /// The library's own context.
     pub ctx: Context,
     /// Dropped last: the context's threads.
@@ -87,19 +87,15 @@ pub(in crate::capi) struct State {
     progress_room: usize,
     entered: AtomicBool,
     poisoned: AtomicBool,
-    began: Began,
+    call_start: CallStart,
     timings: Mutex<Vec<PhaseTime>>,
 }
 
-impl HandleType for frz_context {
-    type Value = State;
-    const NAME: &'static str = "context";
-    const TAG: u32 = 0x6672_7a02;
-}
+handle!(frz_context, ContextHandle, "context", 2);
 
-/// A call of a real-time frame, with exclusive use of a context, except for cancel, reset and progress. It takes no lock, allocates
-/// nothing, reads no clock, and has no phases, polls or progress.
-pub(in crate::capi) struct LightCall<'a>(Reading<'a, State>);
+/// A real-time call, which has exclusive use of a context except for cancel, reset and progress. It takes no lock, allocates nothing,
+/// reads no clock, and has no phases, polls or progress.
+pub(in crate::capi) struct LightCall<'a>(Reading<'a, ContextHandle>);
 
 impl<'a> LightCall<'a> {
     /// # Safety
@@ -133,7 +129,7 @@ impl Drop for LightCall<'_> {
     }
 }
 
-/// Begins a call of a real-time frame with a context, unless it is cancelled; a cancel is read only here.
+/// Begins a real-time call with a context, unless it is cancelled. A later cancel takes effect only in frames that may take long.
 ///
 /// # Safety
 /// As [`enter`].
@@ -146,9 +142,9 @@ pub(in crate::capi) unsafe fn enter_light<'a>(context: *const frz_context) -> Ou
     Ok(call)
 }
 
-/// A call with phases, polls and progress, with exclusive use of a context as a [`LightCall`] has.
+/// A call with phases, polls and progress; it has exclusive use of a context as a [`LightCall`] has.
 pub(in crate::capi) struct Call<'a> {
-    /// Dropped first: the next call must not begin within this one, as it would inherit its cancel.
+    /// Dropped before `light`, which admits the next call: that call must not inherit this one's cancel.
     phases: (Running, Phases),
     light: LightCall<'a>,
 }
@@ -166,7 +162,7 @@ impl Drop for Call<'_> {
         if !timings.is_empty() {
             *self.light.0.timings.lock().unwrap_or_else(PoisonError::into_inner) = timings;
         }
-        self.light.0.began.set(None);
+        self.light.0.call_start.set(None);
     }
 }
 
@@ -178,11 +174,11 @@ pub(in crate::capi) unsafe fn enter<'a>(context: *const frz_context) -> Outcome<
     // SAFETY: guaranteed by the caller.
     let light = unsafe { LightCall::begin(context) }?;
     let phases = (light.ctx().begin(), light.ctx().collect());
-    light.0.began.set(Some(Instant::now()));
+    light.0.call_start.set(Some(Instant::now()));
     Ok(Call { phases, light })
 }
 
-/// An interface function that creates an object: `out` receives it, or NULL after a failure.
+/// The body of an interface function that creates an object: `out` receives it, or NULL after a failure.
 ///
 /// # Safety
 /// As [`enter`] and [`give`].
@@ -200,7 +196,7 @@ pub(in crate::capi) unsafe fn creates<N: HandleType, V: Into<N::Value>>(
     })
 }
 
-/// An interface function that moves an object through a step and reports what the step did.
+/// The body of an interface function that moves an object through a step and reports what the step did.
 ///
 /// # Safety
 /// As [`enter`], [`change`] and [`reports`].
@@ -219,7 +215,7 @@ pub(in crate::capi) unsafe fn steps<N: HandleType, T: Sized32>(
     })
 }
 
-/// A host's pointer, which is only passed back to it.
+/// A pointer of a host, which is passed back to it and never dereferenced.
 #[derive(Clone, Copy)]
 struct User(*mut c_void);
 
@@ -232,23 +228,23 @@ impl User {
     }
 }
 
-/// A verb as a zero-terminated array.
-fn letters(verb: &str) -> [c_char; 32] {
+/// A text as a zero-terminated array, cut to 31 bytes.
+fn zero_terminated(verb: &str) -> [c_char; 32] {
     let mut out = [0; 32];
     out.iter_mut().take(31).zip(verb.bytes()).for_each(|(to, from)| *to = from as c_char);
     out
 }
 
 /// Memory limit of a new context (bytes).
-fn usual_limit() -> u64 {
+fn default_memory_limit() -> u64 {
     machine_memory().unwrap_or(u64::MAX)
 }
 
-fn progress_of(progress: &Progress, began: &Began) -> frz_progress {
+fn progress_of(progress: &Progress, call_start: &CallStart) -> frz_progress {
     frz_progress {
-        stage: letters(progress.phase),
+        stage: zero_terminated(progress.phase),
         stages_done: progress.phases_done as u64,
-        seconds: began.seconds(),
+        seconds: call_start.seconds(),
         fraction: progress.part.map_or(-1.0, f64::from),
     }
 }
@@ -278,16 +274,20 @@ pub unsafe extern "C" fn frz_context_create(
         }
         let threads = read(pool.cast_const())?.share();
         let ctx = Context::new(threads.0.clone());
-        ctx.set_memory_limit(usual_limit());
+        ctx.set_memory_limit(default_memory_limit());
         give(
             out,
-            State {
+            ContextHandle {
                 ctx,
                 _threads: threads,
-                progress_room: if abi & 0xffff == 0 { FIRST_PROGRESS } else { size_of::<frz_progress>() },
+                progress_room: if abi & 0xffff == 0 {
+                    FIRST_PROGRESS_BYTES
+                } else {
+                    size_of::<frz_progress>()
+                },
                 entered: AtomicBool::new(false),
                 poisoned: AtomicBool::new(false),
-                began: Began::default(),
+                call_start: CallStart::default(),
                 timings: Mutex::default(),
             },
         )
@@ -325,10 +325,10 @@ pub unsafe extern "C" fn frz_context_set_poll(
         // SAFETY: the context is NULL or alive.
         let call = unsafe { enter(context) }?;
         let user = User(user);
-        let began = call.0.began.clone();
+        let call_start = call.0.call_start.clone();
         call.ctx().set_poll(poll.map(|poll| {
             let ask = move |progress: &Progress| {
-                let reported = progress_of(progress, &began);
+                let reported = progress_of(progress, &call_start);
                 // SAFETY: the host guarantees a function that takes these.
                 unsafe { poll(user.pointer(), &reported) != 0 }
             };
@@ -381,7 +381,7 @@ pub unsafe extern "C" fn frz_context_set_memory_limit(context: *mut frz_context,
     guard(|| {
         // SAFETY: the context is NULL or alive.
         let call = unsafe { enter(context) }?;
-        call.ctx().set_memory_limit(if bytes == 0 { usual_limit() } else { bytes });
+        call.ctx().set_memory_limit(if bytes == 0 { default_memory_limit() } else { bytes });
         Ok(())
     })
 }
@@ -428,9 +428,9 @@ pub unsafe extern "C" fn frz_context_progress(
     // SAFETY: the pointers are NULL or valid, and `out` has as much room as the header of the context's creator states.
     guard(|| unsafe {
         let out = required(out, "out")?.cast::<u8>();
-        out.write_bytes(0, FIRST_PROGRESS);
+        out.write_bytes(0, FIRST_PROGRESS_BYTES);
         let state = read(context)?;
-        let progress = progress_of(&state.ctx.progress(), &state.began);
+        let progress = progress_of(&state.ctx.progress(), &state.call_start);
         std::ptr::copy_nonoverlapping((&raw const progress).cast::<u8>(), out, state.progress_room);
         Ok(())
     })
@@ -450,13 +450,15 @@ pub unsafe extern "C" fn frz_context_timings(
     count: *mut usize,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    guard(|| unsafe {
-        let count = required(count, "count")?;
-        count.write(0);
-        let call = enter(context)?;
-        let timings = call.0.timings.lock().unwrap_or_else(PoisonError::into_inner);
-        let time =
-            |time: &PhaseTime| frz_stage_time { stage: letters(time.name), seconds: time.time.as_secs_f64() };
-        dst.list(count, timings.len(), || Ok(timings.iter().map(time).collect()))
-    })
+    unsafe {
+        lists(count, || {
+            let call = enter(context)?;
+            let timings = call.0.timings.lock().unwrap_or_else(PoisonError::into_inner);
+            let time = |PhaseTime { name, time, .. }: &PhaseTime| frz_stage_time {
+                stage: zero_terminated(name),
+                seconds: time.as_secs_f64(),
+            };
+            list(timings.iter().map(time), &dst, count)
+        })
+    }
 }

@@ -1,4 +1,4 @@
-//! Threads.
+//! Pools of worker threads.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -41,11 +41,7 @@ impl Drop for Alive {
     }
 }
 
-impl HandleType for frz_pool {
-    type Value = Threads;
-    const NAME: &'static str = "pool";
-    const TAG: u32 = 0x6672_7a01;
-}
+handle!(frz_pool, Threads, "pool", 1);
 
 /// Starts worker threads.
 ///

@@ -1,10 +1,10 @@
-//! Shapes of calls: what they change, and what they report.
+//! Bodies that real-time calls share: they change an object, or report numbers.
 
 use crate::capi::ffi::*;
 use crate::capi::runtime::context::{enter_light, frz_context};
 use crate::context::Context;
 
-/// An interface function that changes an object in real time, and reports what it did unless `report` is NULL.
+/// The body of an interface function that changes an object in real time, and reports what it did unless `report` is NULL.
 ///
 /// # Safety
 /// The pointers must be NULL or valid.
@@ -23,7 +23,7 @@ pub(in crate::capi) unsafe fn changes<N: HandleType, T: Sized32, R: Into<T>>(
     })
 }
 
-/// An interface function that fills a struct with what is known of an object; all zeroes after a failure.
+/// The body of an interface function that fills a struct with properties of an object; all zeroes after a failure.
 ///
 /// # Safety
 /// The pointer must be NULL or valid.
@@ -35,11 +35,11 @@ pub(in crate::capi) unsafe fn informs<T: Sized32, R: Into<T>>(
     guard(|| unsafe { reports(required(info, T::NAME)?, work) })
 }
 
-/// Runs the work of a call that returns a number, which is written to the host unless the pointer is NULL; 0 after a failure.
+/// Runs the work of a call and writes the number that it returns to the host unless the pointer is NULL; 0 after a failure.
 ///
 /// # Safety
 /// `out` must be NULL or point to memory for a number.
-pub(in crate::capi) unsafe fn answers(out: *mut f64, work: impl FnOnce() -> Outcome<f64>) -> Outcome {
+pub(in crate::capi) unsafe fn answer_some(out: *mut f64, work: impl FnOnce() -> Outcome<f64>) -> Outcome {
     // SAFETY: guaranteed by the caller.
     unsafe {
         write_some(out, 0.0);

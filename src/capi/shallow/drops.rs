@@ -1,10 +1,10 @@
-//! Shallow liquid in the air: its drops, and their mesh.
+//! Shallow liquid in the air: drops and their mesh.
 
 use super::calls::informs;
+use super::handle::frz_shallow;
 use super::snapshot::frz_shallow_snapshot;
-use super::spill::frz_shallow;
 use super::surface::{
-    Buffer, Wanted, check_buffers, check_room, frz_shallow_layout, frz_shallow_size, indices_in, writes,
+    Buffer, MeshRequest, check_buffers, check_room, frz_shallow_layout, frz_shallow_size, indices_in, writes,
 };
 use crate::capi::ffi::*;
 use crate::capi::runtime::context::frz_context;
@@ -67,10 +67,7 @@ pub unsafe extern "C" fn frz_shallow_drops(
     count: *mut usize,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    guard(|| unsafe {
-        required(count, "count")?.write_unaligned(0);
-        list(read(shallow)?.shallow.drops().map(frz_shallow_drop::from), &dst, count)
-    })
+    unsafe { lists(count, || list(read(shallow)?.shallow.drops().map(frz_shallow_drop::from), &dst, count)) }
 }
 
 /// Lists the drops that were in the air when a snapshot was taken, as frz_shallow_drops does (a real-time call: see frz_shallow).
@@ -86,10 +83,11 @@ pub unsafe extern "C" fn frz_shallow_snapshot_drops(
     count: *mut usize,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    guard(|| unsafe {
-        required(count, "count")?.write_unaligned(0);
-        list(read(snapshot)?.snapshot.drops().iter().copied().map(frz_shallow_drop::from), &dst, count)
-    })
+    unsafe {
+        lists(count, || {
+            list(read(snapshot)?.snapshot.drops().iter().copied().map(frz_shallow_drop::from), &dst, count)
+        })
+    }
 }
 
 /// Buffers that a mesh of drops is written to, as in frz_shallow_target. Zero it, then set struct_size.
@@ -112,10 +110,7 @@ pub struct frz_shallow_drops_target {
     pub indices: frz_span,
 }
 
-// SAFETY: numbers and pointers.
-unsafe impl Sized32 for frz_shallow_drops_target {
-    const NAME: &'static str = "frz_shallow_drops_target";
-}
+sized32!(frz_shallow_drops_target);
 
 impl frz_shallow_drops_target {
     fn buffers(&self) -> [Buffer<'_>; 5] {
@@ -148,17 +143,13 @@ impl frz_shallow_drops_target {
     }
 }
 
-impl Wanted<frz_shallow_drops_target> {
+impl MeshRequest<frz_shallow_drops_target> {
     /// Writes the mesh and its size.
-    ///
-    /// # Safety
-    /// As in [`Wanted::new`], and the spans must describe memory that can be written.
-    unsafe fn write_drops(&self, balls: &mut Balls, drops: &[Droplet]) -> Outcome {
-        // SAFETY: guaranteed by the caller.
+    fn write_drops(&self, balls: &mut Balls, drops: &[Droplet]) -> Outcome {
+        // SAFETY: guaranteed by the caller of `MeshRequest::new`.
         let mut target = unsafe { self.given.target() }?;
         let counts = balls.count(drops);
-        // SAFETY: as above.
-        unsafe { self.tell(counts) }?;
+        self.report_size(counts)?;
         check_room(&self.given.buffers(), &counts)?;
         balls.build(drops, &self.layout, &mut target)?;
         Ok(())
@@ -178,8 +169,8 @@ pub unsafe extern "C" fn frz_shallow_drops_bound(
     // SAFETY: the pointers are NULL or valid.
     unsafe {
         informs(size, || {
-            let most = read(shallow)?.shallow.params().falls.map_or(0, |falls| falls.max_packets);
-            Ok(bound(most))
+            let max_packets = read(shallow)?.shallow.params().falls.map_or(0, |falls| falls.max_packets);
+            Ok(bound(max_packets))
         })
     }
 }
@@ -203,10 +194,10 @@ pub unsafe extern "C" fn frz_shallow_drops_mesh(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so are the spans.
     unsafe {
-        writes(context, shallow, (layout, target, size), |spill, wanted| {
-            spill.drops.clear();
-            spill.drops.extend(spill.shallow.drops());
-            wanted.write_drops(&mut spill.balls, &spill.drops)
+        writes(context, shallow, (layout, target, size), |liquid, request| {
+            liquid.drops.clear();
+            liquid.drops.extend(liquid.shallow.drops());
+            request.write_drops(&mut liquid.balls, &liquid.drops)
         })
     }
 }
@@ -229,8 +220,8 @@ pub unsafe extern "C" fn frz_shallow_snapshot_drops_mesh(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so are the spans.
     unsafe {
-        writes(context, snapshot, (layout, target, size), |taken, wanted| {
-            wanted.write_drops(&mut taken.balls, taken.snapshot.drops())
+        writes(context, snapshot, (layout, target, size), |handle, request| {
+            request.write_drops(&mut handle.balls, handle.snapshot.drops())
         })
     }
 }

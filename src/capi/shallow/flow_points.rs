@@ -1,4 +1,4 @@
-//! Flow points of a host, and the triangles that they move with.
+//! Flow points of a host, which may move with triangles of the ground.
 
 use super::ground::Terrain;
 use crate::capi::ffi::*;
@@ -63,34 +63,30 @@ pub struct frz_shallow_flow {
     pub opening: f64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_shallow_flow {
-    const NAME: &'static str = "frz_shallow_flow";
-}
+sized32!(frz_shallow_flow);
 
 /// A flow point, and the triangle that it moves with.
-pub(in crate::capi) struct Attached {
+pub(in crate::capi) struct AttachedFlow {
     /// The flow point at its current position.
     pub point: FlowPoint,
     /// Index of the triangle, and the barycentric coordinates on it.
-    pub on: Option<(u32, [f64; 3])>,
+    pub triangle: Option<(u32, [f64; 3])>,
 }
 
-impl Attached {
-    /// A flow point of a host.
+impl AttachedFlow {
     pub fn of(given: &frz_shallow_flow, terrain: &Terrain) -> Outcome<Self> {
         no_flags(given.flags, FRZ_SHALLOW_ON_TRIANGLE)?;
         let kind = meaning("kind", "frz_shallow_flow_kind", given.kind, &KINDS)?(given);
         let is_attached = given.flags & FRZ_SHALLOW_ON_TRIANGLE != 0;
-        let on = is_attached.then_some((given.triangle, given.shares));
-        if let Some((_, shares)) = &on {
+        let triangle = is_attached.then_some((given.triangle, given.shares));
+        if let Some((_, shares)) = &triangle {
             let sum: f64 = shares.iter().sum();
             let is_one = (sum - 1.0).abs() < 1e-6;
             refuse(!is_one, || format!("the sum of the shares {shares:?} is not 1"))?;
         }
-        let at = on.as_ref().map_or(Ok(given.at), |on| terrain.position(on))?;
+        let at = triangle.as_ref().map_or(Ok(given.at), |triangle| terrain.position(triangle))?;
         let pulse = Pulse { frequency: given.pulse_frequency, share: given.pulse_share };
         let pulse = (pulse.frequency != 0.0).then_some(pulse);
-        Ok(Self { point: FlowPoint { kind, at, radius: given.radius, rate: given.rate, pulse }, on })
+        Ok(Self { point: FlowPoint { kind, at, radius: given.radius, rate: given.rate, pulse }, triangle })
     }
 }

@@ -1,4 +1,4 @@
-//! The ground below shallow liquid, as its handle holds it.
+//! The ground below shallow liquid, as its handle keeps it.
 
 use std::ops::Range;
 
@@ -16,13 +16,12 @@ use crate::shallow::terrain::{Solids, height};
 #[cfg(feature = "vdb")]
 use crate::vdb::FloatGrid;
 
-/// What the ground was made from, so that it can be made again.
+/// What the ground is made from, so that it can be rebuilt.
 pub(in crate::capi) enum Terrain {
-    /// A mesh.
-    Mesh(Box<Moving>),
-    /// A height field; solids of the cells of its last change.
+    Mesh(Box<MovingMesh>),
+    /// A height field: the solids of the cells that its last change rebuilt.
     Heights(Vec<[Solid; 1]>),
-    /// A level set: it does not move.
+    /// A level set, which cannot move.
     #[cfg(feature = "vdb")]
     LevelSet,
 }
@@ -43,15 +42,15 @@ impl Terrain {
         if let Some(what) = orientation.warning() {
             ctx.warn(&format!("the mesh: {what}"));
         }
-        let mut moving = Box::new(Moving {
+        let mut moving = Box::new(MovingMesh {
             positions: Vec::with_capacity(mesh.positions.len()),
-            coming: mesh.positions.clone(),
+            incoming: mesh.positions.clone(),
             triangles,
-            own: (!orientation.is_unchanged()).then(|| mesh.triangles.clone()),
+            host_triangles: (!orientation.is_unchanged()).then(|| mesh.triangles.clone()),
             caster: Caster::new(grid, heights)?,
         });
         let solids = ctx.phase("cast", || moving.cast(grid, heights))?;
-        moving.come();
+        moving.adopt_incoming();
         Ok((Self::Mesh(moving), solids))
     }
 
@@ -84,7 +83,7 @@ impl Terrain {
     }
 
     /// The mesh, to move it.
-    pub(in crate::capi) fn mesh(&mut self) -> Outcome<&mut Moving> {
+    pub(in crate::capi) fn mesh(&mut self) -> Outcome<&mut MovingMesh> {
         match self {
             Self::Mesh(mesh) => Ok(mesh),
             _ => Err(Failure::argument("the liquid was not made with a mesh that could move")),
@@ -99,12 +98,12 @@ impl Terrain {
         }
     }
 
-    /// The position (m) on a triangle with these barycentric coordinates.
+    /// The position (m) on a triangle, given by its index and barycentric coordinates.
     pub(in crate::capi) fn position(&self, (triangle, shares): &(u32, [f64; 3])) -> Outcome<[f64; 3]> {
         let Self::Mesh(mesh) = self else {
             return Err(Failure::argument("the liquid was not made with a mesh: there is no triangle"));
         };
-        let own = mesh.own.as_ref().unwrap_or(&mesh.triangles);
+        let own = mesh.host_triangles.as_ref().unwrap_or(&mesh.triangles);
         let Some(corners) = own.get(*triangle as usize) else {
             let count = own.len();
             return Err(Failure::argument(format!("triangle = {triangle} is none of the mesh's {count}")));
@@ -115,44 +114,44 @@ impl Terrain {
 }
 
 /// A mesh whose vertices move.
-pub(in crate::capi) struct Moving {
+pub(in crate::capi) struct MovingMesh {
     pub(in crate::capi) positions: Vec<Vec3>,
-    /// Incoming positions.
-    pub coming: Vec<Vec3>,
-    /// Triangles with closed parts outward, without duplicates.
+    /// Positions that a call has read but not yet adopted.
+    pub incoming: Vec<Vec3>,
+    /// Triangles without duplicates, closed parts facing outward.
     pub(in crate::capi) triangles: Vec<[u32; 3]>,
-    /// Triangles as the host gave them, if that differs.
-    pub own: Option<Vec<[u32; 3]>>,
+    /// The host's own triangles, if they differ.
+    pub host_triangles: Option<Vec<[u32; 3]>>,
     pub caster: Caster,
 }
 
-impl Moving {
+impl MovingMesh {
     /// The solids of all cells with the incoming vertices.
     pub(in crate::capi) fn cast(&mut self, grid: Grid, heights: Heights) -> Result<Solids> {
-        self.caster.cast(&self.coming, &self.triangles, all_cells(&grid))?;
+        self.caster.cast(&self.incoming, &self.triangles, all_cells(&grid))?;
         let mut solids = Solids::empty(grid, heights);
         (0..grid.cells()).for_each(|cell| solids.push(self.caster.at(cell)));
         Ok(solids)
     }
 
-    /// Adopts the incoming vertices.
-    pub(in crate::capi) fn come(&mut self) {
-        std::mem::swap(&mut self.positions, &mut self.coming);
+    /// Makes the incoming positions the current ones.
+    pub(in crate::capi) fn adopt_incoming(&mut self) {
+        std::mem::swap(&mut self.positions, &mut self.incoming);
     }
 
-    /// Reads the new positions of the vertices.
+    /// Reads the incoming positions.
     ///
     /// # Safety
     /// The view must describe memory that can be read.
-    pub(in crate::capi) unsafe fn take(&mut self, positions: &frz_view) -> Outcome {
+    pub(in crate::capi) unsafe fn read_positions(&mut self, positions: &frz_view) -> Outcome {
         let count = self.positions.len();
         // SAFETY: guaranteed by the caller.
         let given =
             unsafe { one_for_each::<[f32; 3]>(positions, "positions", count, ["the mesh has", "vertices"]) }?;
-        self.coming.clear();
-        self.coming.extend(given.map(Vec3::from));
-        let is_wild = |position: &Vec3| !position.iter().all(|number| number.is_finite());
-        match self.coming.iter().position(is_wild) {
+        self.incoming.clear();
+        self.incoming.extend(given.map(Vec3::from));
+        let is_not_finite = |position: &Vec3| !position.iter().all(|number| number.is_finite());
+        match self.incoming.iter().position(is_not_finite) {
             None => Ok(()),
             Some(at) => Err(Failure::argument(format!("positions: element {at} is not finite"))),
         }
@@ -164,7 +163,7 @@ pub(in crate::capi) fn all_cells(grid: &Grid) -> [Range<usize>; 2] {
     grid.size.map(|count| 0..count)
 }
 
-/// How far (cells) a cell's centre may lie outside a box and still count as inside.
+/// Tolerance (cells) of the test whether a cell's centre lies in a box.
 const ROUNDING: f64 = 1e-6;
 
 /// The cells whose centres lie within a host's box; all cells for NULL.
@@ -182,7 +181,7 @@ pub(in crate::capi) unsafe fn cells_in(grid: &Grid, bounds: *const f64) -> Outco
     refuse(!(x0 <= x1 && z0 <= z1), || format!("bounds = {bounds:?} m have no inside"))?;
     let range = |axis: usize, low: f64, high: f64| {
         let count = grid.size[axis] as f64;
-        // In cells, from the centre of the first; rounding excludes none.
+        // In cells, from the centre of the first.
         let [low, high] = [low, high].map(|position| (position - grid.origin[axis]) / grid.cell - 0.5);
         let first = (low - ROUNDING).ceil().clamp(0.0, count);
         let end = ((high + ROUNDING).floor() + 1.0).clamp(first, count);

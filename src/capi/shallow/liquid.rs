@@ -1,15 +1,15 @@
 //! Small amounts of liquid on a terrain, in real time.
 
 use super::calls::changes;
-use super::ground::Terrain;
+use super::handle::{ShallowHandle, frz_shallow};
 use super::params::{frz_shallow_domain, frz_shallow_params};
-use super::spill::{ShallowHandle, frz_shallow};
-use super::surroundings::Setup;
+use super::surroundings::{Ground, creates_on};
 use crate::capi::ffi::*;
 #[cfg(feature = "vdb")]
 use crate::capi::grid::sparse::frz_grid;
 use crate::capi::mesh::triangles::frz_mesh;
-use crate::capi::runtime::context::{creates, frz_context};
+use crate::capi::runtime::context::frz_context;
+use crate::context::Context;
 use crate::shallow::Report;
 use crate::shallow::time_step::MAX_STEPS;
 
@@ -36,10 +36,7 @@ pub struct frz_shallow_report {
     pub slowed: u64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_shallow_report {
-    const NAME: &'static str = "frz_shallow_report";
-}
+sized32!(frz_shallow_report);
 
 fields_of!(Report => frz_shallow_report { steps, seconds, deepest, emptied, filled, slowed });
 
@@ -70,12 +67,7 @@ pub unsafe extern "C" fn frz_shallow_create(
     out: *mut *mut frz_shallow,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    unsafe {
-        creates(context, out, |ctx| {
-            let terrain = |grid, range| Terrain::of_mesh(ctx, &read(mesh)?.triangles, grid, range);
-            ShallowHandle::new(ctx, Setup::new(ctx, params, domain, terrain)?)
-        })
-    }
+    unsafe { creates_on(context, (params, domain, Ground::Mesh(mesh)), out, ShallowHandle::new) }
 }
 
 /// Creates a liquid on a height field, initially dry.
@@ -96,12 +88,7 @@ pub unsafe extern "C" fn frz_shallow_create_heights(
     out: *mut *mut frz_shallow,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    unsafe {
-        creates(context, out, |ctx| {
-            let terrain = |grid, range| Terrain::of_heights(heights.in_place::<f32>("heights")?, grid, range);
-            ShallowHandle::new(ctx, Setup::new(ctx, params, domain, terrain)?)
-        })
-    }
+    unsafe { creates_on(context, (params, domain, Ground::Heights(heights)), out, ShallowHandle::new) }
 }
 
 /// Creates a liquid on a level set, initially dry.
@@ -123,12 +110,7 @@ pub unsafe extern "C" fn frz_shallow_create_grid(
     out: *mut *mut frz_shallow,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    unsafe {
-        creates(context, out, |ctx| {
-            let terrain = |grid, range| Terrain::of_level_set(ctx, read(level_set)?.floats()?, grid, range);
-            ShallowHandle::new(ctx, Setup::new(ctx, params, domain, terrain)?)
-        })
-    }
+    unsafe { creates_on(context, (params, domain, Ground::LevelSet(level_set)), out, ShallowHandle::new) }
 }
 
 /// Destroys a liquid; NULL is ignored. Its snapshots remain.
@@ -175,14 +157,30 @@ pub unsafe extern "C" fn frz_shallow_step(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     unsafe {
-        changes(context, shallow, report, |ctx, spill| {
+        changes(context, shallow, report, |ctx, liquid| {
             within("budget_seconds", budget_seconds, 0.0..=1e6, " s")?;
             let done = match budget_seconds {
-                0.0 => spill.shallow.step(ctx, dt),
-                budget => spill.shallow.step_within(ctx, dt, budget),
+                0.0 => liquid.shallow.step(ctx, dt),
+                budget => liquid.shallow.step_within(ctx, dt, budget),
             };
             Ok(frz_shallow_report::of(done?, dt))
         })
+    }
+}
+
+impl ShallowHandle {
+    /// Computes a frame with a host's steps.
+    ///
+    /// # Safety
+    /// The view must describe memory that can be read.
+    unsafe fn replay(&mut self, ctx: &Context, steps: &frz_view) -> Outcome<frz_shallow_report> {
+        // SAFETY: guaranteed by the caller.
+        let given = unsafe { steps.in_place::<f64>("steps") }?;
+        within("the count of steps", given.len() as f64, 1.0..=f64::from(MAX_STEPS), "")?;
+        self.steps.clear();
+        self.steps.extend(given);
+        let dt = self.steps.iter().sum();
+        Ok(frz_shallow_report::of(self.shallow.replay(ctx, &self.steps)?, dt))
     }
 }
 
@@ -202,16 +200,7 @@ pub unsafe extern "C" fn frz_shallow_replay(
     report: *mut frz_shallow_report,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    unsafe {
-        changes(context, shallow, report, |ctx, spill| {
-            let given = steps.in_place::<f64>("steps")?;
-            within("the count of steps", given.len() as f64, 1.0..=f64::from(MAX_STEPS), "")?;
-            spill.steps.clear();
-            spill.steps.extend(given);
-            let dt = spill.steps.iter().sum();
-            Ok(frz_shallow_report::of(spill.shallow.replay(ctx, &spill.steps)?, dt))
-        })
-    }
+    unsafe { changes(context, shallow, report, |ctx, liquid| liquid.replay(ctx, &steps)) }
 }
 
 /// Lists the steps of the last frame: frz_shallow_replay reproduces it from them.
@@ -227,8 +216,5 @@ pub unsafe extern "C" fn frz_shallow_last_steps(
     count: *mut usize,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    guard(|| unsafe {
-        required(count, "count")?.write_unaligned(0);
-        list(read(shallow)?.shallow.last_steps().iter().copied(), &dst, count)
-    })
+    unsafe { lists(count, || list(read(shallow)?.shallow.last_steps().iter().copied(), &dst, count)) }
 }

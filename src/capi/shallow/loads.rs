@@ -1,6 +1,6 @@
 //! Loads of shallow liquid on the bodies in it.
 
-use super::spill::{ShallowHandle, frz_shallow};
+use super::handle::{ShallowHandle, frz_shallow};
 use crate::capi::ffi::*;
 use crate::shallow::Load;
 
@@ -24,10 +24,7 @@ pub struct frz_shallow_load {
     pub wetted: f64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_shallow_load {
-    const NAME: &'static str = "frz_shallow_load";
-}
+sized32!(frz_shallow_load);
 
 fields_of!(Load => frz_shallow_load { pressure, drag, torque, displaced, wetted });
 
@@ -66,7 +63,8 @@ pub unsafe extern "C" fn frz_shallow_loads(
     // SAFETY: the pointers are NULL or valid, and so is the view.
     guard(|| unsafe {
         put(loads, (0..count).map(|_| Load::default()))?;
-        let ShallowHandle { shallow, velocities_of_bodies: own, loads: felt, .. } = &mut *change(shallow)?;
+        let ShallowHandle { shallow, velocities_of_bodies: own, loads: computed, .. } =
+            &mut *change(shallow)?;
         let bodies = shallow.bodies().len();
         refuse(count != bodies, || format!("count = {count} is not that of the {bodies} bodies"))?;
         own.clear();
@@ -75,9 +73,9 @@ pub unsafe extern "C" fn frz_shallow_loads(
         } else {
             own.extend(one_for_each::<[f64; 3]>(&velocities, "velocities", bodies, ["there are", "bodies"])?);
         }
-        felt.clear();
-        felt.resize(bodies, Load::default());
-        shallow.loads(density, own, felt)?;
-        put(loads, felt.iter().copied())
+        computed.clear();
+        computed.resize(bodies, Load::default());
+        shallow.loads(density, own, computed)?;
+        put(loads, computed.iter().copied())
     })
 }

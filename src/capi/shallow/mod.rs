@@ -3,7 +3,7 @@
 // In the order of the header.
 pub mod params;
 
-pub mod spill;
+pub mod handle;
 
 pub mod liquid;
 

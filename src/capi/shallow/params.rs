@@ -87,8 +87,7 @@ const LIQUIDS: [(u32, Liquid); 5] = [
     (FRZ_LIQUID_THINNING_BLOOD as u32, Liquid::THINNING_BLOOD),
 ];
 
-const PACES: [(u32, frz_shallow_pace); 2] =
-    [(FRZ_SHALLOW_REALTIME as u32, FRZ_SHALLOW_REALTIME), (FRZ_SHALLOW_EXACT as u32, FRZ_SHALLOW_EXACT)];
+const PACES: Meanings<frz_shallow_pace, 2> = numbered! { FRZ_SHALLOW_REALTIME, FRZ_SHALLOW_EXACT };
 
 const BORDERS: [(u32, Border); 3] = [
     (FRZ_SHALLOW_CLOSED as u32, Border::Closed),
@@ -163,29 +162,22 @@ pub struct frz_shallow_params {
     pub thickening_times: f64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_shallow_params {
-    const SIZES: &'static [usize] =
-        &[std::mem::offset_of!(frz_shallow_params, falls_height), size_of::<Self>()];
-    const NAME: &'static str = "frz_shallow_params";
-
-    fn defaults() -> Self {
-        let (defaults, falls) = (Params::default(), Falls::default());
-        let longest_step = if let TimeStepping::Realtime(longest) = defaults.pace { longest } else { 0.0 };
-        // Enums have their first value.
-        let mut params = Self {
-            longest_step,
-            falls_height: falls.height,
-            falls_interval: falls.interval,
-            falls_drop: falls.drop,
-            thickening_scalar: FRZ_SHALLOW_NO_SCALAR,
-            thickening_times: 1.0,
-            ..Params::default().into()
-        };
-        params.set_liquid(&defaults.liquid);
-        params
-    }
-}
+sized32!(frz_shallow_params, [falls_height], {
+    let (defaults, falls) = (Params::default(), Falls::default());
+    let longest_step = if let TimeStepping::Realtime(longest) = defaults.pace { longest } else { 0.0 };
+    // Enums keep 0, their first value, which is the default.
+    let mut params = Self {
+        longest_step,
+        falls_height: falls.height,
+        falls_interval: falls.interval,
+        falls_drop: falls.drop,
+        thickening_scalar: FRZ_SHALLOW_NO_SCALAR,
+        thickening_times: 1.0,
+        ..Params::default().into()
+    };
+    params.set_liquid(&defaults.liquid);
+    params
+});
 
 fields_of!(Params <=> frz_shallow_params { gravity, kept, rest });
 
@@ -305,10 +297,7 @@ pub struct frz_shallow_domain {
     pub high: f64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_shallow_domain {
-    const NAME: &'static str = "frz_shallow_domain";
-}
+sized32!(frz_shallow_domain);
 
 /// Memory (bytes) for a cell with one solid while a terrain is made: solids and crossings, then columns, pipes and the surface.
 const CELL_BYTES: u64 = 160;

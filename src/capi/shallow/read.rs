@@ -1,17 +1,11 @@
-//! Shallow liquid as numbers: its columns, at points, in boxes.
+//! Reads shallow liquid: arrays of columns, samples at points, volumes in boxes.
 
 use std::ffi::c_void;
 
 use super::calls::informs;
-use super::spill::frz_shallow;
+use super::handle::frz_shallow;
 use crate::capi::ffi::*;
 use crate::shallow::{Shallow, View};
-
-/// Layer of a volume: all layers.
-pub const FRZ_SHALLOW_ALL_LAYERS: u32 = 0xffff_ffff;
-
-/// Column of a sample: there is no column.
-pub const FRZ_SHALLOW_NO_COLUMN: u32 = 0xffff_ffff;
 
 /// Properties of a shallow liquid.
 #[repr(C)]
@@ -37,10 +31,13 @@ pub struct frz_shallow_info {
     pub last_step: f64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_shallow_info {
-    const NAME: &'static str = "frz_shallow_info";
-}
+sized32!(frz_shallow_info);
+
+/// Layer of a volume: all layers.
+pub const FRZ_SHALLOW_ALL_LAYERS: u32 = 0xffff_ffff;
+
+/// Column of a sample: there is no column.
+pub const FRZ_SHALLOW_NO_COLUMN: u32 = 0xffff_ffff;
 
 /// Column arrays that frz_shallow_read copies. An index without a column has the cell (-1, -1), no depth, and a ceiling at its base.
 #[repr(u32)]
@@ -83,16 +80,10 @@ pub enum frz_shallow_lent {
 use frz_shallow_array::*;
 use frz_shallow_lent::*;
 
-const ARRAYS: [(u32, frz_shallow_array); 8] = [
-    (0, FRZ_SHALLOW_DEPTH),
-    (1, FRZ_SHALLOW_BASE),
-    (2, FRZ_SHALLOW_CEILING),
-    (3, FRZ_SHALLOW_CELL),
-    (4, FRZ_SHALLOW_LAYER),
-    (5, FRZ_SHALLOW_FLUX_EAST),
-    (6, FRZ_SHALLOW_FLUX_SOUTH),
-    (7, FRZ_SHALLOW_VELOCITY),
-];
+const ARRAYS: Meanings<frz_shallow_array, 8> = numbered! {
+    FRZ_SHALLOW_DEPTH, FRZ_SHALLOW_BASE, FRZ_SHALLOW_CEILING, FRZ_SHALLOW_CELL, FRZ_SHALLOW_LAYER,
+    FRZ_SHALLOW_FLUX_EAST, FRZ_SHALLOW_FLUX_SOUTH, FRZ_SHALLOW_VELOCITY
+};
 
 const LENT: Meanings<fn(&Shallow) -> *const c_void, 5> = [
     (FRZ_SHALLOW_LENT_DEPTH as u32, |shallow| shallow.depths().as_ptr().cast()),
@@ -150,7 +141,8 @@ pub unsafe extern "C" fn frz_shallow_read(
     guard(|| unsafe {
         let array = meaning("array", "frz_shallow_array", array, &ARRAYS)?;
         let shallow = &read(shallow)?.shallow;
-        let (all, wanted) = (shallow.columns(), Requested { columns, dst, count: shallow.columns().len() });
+        let (all, requested) =
+            (shallow.columns(), Requested { columns, dst, count: shallow.columns().len() });
         let heights = all.heights;
         let length = |units: i32| heights.length(f64::from(units)) as f32;
         let height = |units: i32| heights.metres(units) as f32;
@@ -162,19 +154,19 @@ pub unsafe extern "C" fn frz_shallow_read(
             false => [-1; 2],
         };
         match array {
-            FRZ_SHALLOW_DEPTH => wanted.copy(|index| length(shallow.depths()[index])),
-            FRZ_SHALLOW_BASE => wanted.copy(|index| height(all.bases()[index])),
-            FRZ_SHALLOW_CEILING => wanted.copy(|index| height(all.ceilings()[index])),
-            FRZ_SHALLOW_CELL => wanted.copy(cell),
-            FRZ_SHALLOW_LAYER => wanted.copy(|index| all.layer(index) as u32),
-            FRZ_SHALLOW_FLUX_EAST => wanted.copy(east),
-            FRZ_SHALLOW_FLUX_SOUTH => wanted.copy(south),
-            FRZ_SHALLOW_VELOCITY => wanted.copy(|index| shallow.velocity(index)),
+            FRZ_SHALLOW_DEPTH => requested.copy(|index| length(shallow.depths()[index])),
+            FRZ_SHALLOW_BASE => requested.copy(|index| height(all.bases()[index])),
+            FRZ_SHALLOW_CEILING => requested.copy(|index| height(all.ceilings()[index])),
+            FRZ_SHALLOW_CELL => requested.copy(cell),
+            FRZ_SHALLOW_LAYER => requested.copy(|index| all.layer(index) as u32),
+            FRZ_SHALLOW_FLUX_EAST => requested.copy(east),
+            FRZ_SHALLOW_FLUX_SOUTH => requested.copy(south),
+            FRZ_SHALLOW_VELOCITY => requested.copy(|index| shallow.velocity(index)),
         }
     })
 }
 
-/// Columns that a host requests, of `count` indices, and its memory for what it wants to know of them.
+/// The columns that a host requests, out of `count` indices, and its memory for their values.
 pub(in crate::capi) struct Requested {
     pub columns: frz_view,
     pub dst: frz_span,
@@ -268,7 +260,7 @@ pub unsafe extern "C" fn frz_shallow_probe(
     guard(|| unsafe { probe(&read(shallow)?.shallow.view(), &points, &dst) })
 }
 
-/// Reads a liquid at a host's points.
+/// Samples a liquid at a host's points.
 ///
 /// # Safety
 /// The view must describe memory that can be read, the span memory that can be written.
@@ -311,8 +303,8 @@ pub unsafe extern "C" fn frz_shallow_volume(
     // SAFETY: the pointers are NULL or valid.
     guard(|| unsafe {
         answer(volume, "volume", || {
-            let spill = read(shallow)?;
-            let view = spill.shallow.view();
+            let liquid = read(shallow)?;
+            let view = liquid.shallow.view();
             Ok(match (low.is_null() && high.is_null(), layer) {
                 (true, FRZ_SHALLOW_ALL_LAYERS) => view.volume([f64::NEG_INFINITY; 3], [f64::INFINITY; 3])?,
                 (true, layer) => view.layer_volume(layer as usize),

@@ -3,8 +3,8 @@
 use std::ffi::c_char;
 
 use super::calls::informs;
+use super::handle::frz_shallow;
 use super::read::Requested;
-use super::spill::frz_shallow;
 use crate::capi::ffi::*;
 use crate::error::Result;
 use crate::shallow::scalars::MAX_SCALARS;
@@ -53,10 +53,7 @@ pub struct frz_shallow_scalar {
     pub half_life: f64,
 }
 
-// SAFETY: numbers and a pointer.
-unsafe impl Sized32 for frz_shallow_scalar {
-    const NAME: &'static str = "frz_shallow_scalar";
-}
+sized32!(frz_shallow_scalar);
 
 impl frz_shallow_scalar {
     /// # Safety
@@ -219,10 +216,7 @@ pub struct frz_shallow_scalar_balance {
     pub error: i64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_shallow_scalar_balance {
-    const NAME: &'static str = "frz_shallow_scalar_balance";
-}
+sized32!(frz_shallow_scalar_balance);
 
 fields_of!(ScalarBalance => frz_shallow_scalar_balance {
     inside, poured, sourced, drained, absorbed, lost, gained, held, falling, grown, dried

@@ -1,13 +1,15 @@
-//! Shallow liquid as it was after a frame, for another thread.
+//! Snapshots: copies of a shallow liquid after a frame, for another thread.
 
+use super::handle::{ShallowHandle, frz_shallow};
 use super::read::probe;
-use super::spill::{ShallowHandle, frz_shallow};
-use super::surface::prepared::{Ledged, wanted_lifts};
+use super::surface::prepared::{FoundLedges, requested_heights};
 use super::surface::{
-    FRZ_SHALLOW_LIFTED, FRZ_SHALLOW_SKIRTED, frz_shallow_layout, frz_shallow_size, frz_shallow_target, writes,
+    FRZ_SHALLOW_LIFTED, FRZ_SHALLOW_SKIRTED, MeshRequest, frz_shallow_layout, frz_shallow_size,
+    frz_shallow_target, writes,
 };
 use crate::capi::ffi::*;
 use crate::capi::runtime::context::{creates, frz_context};
+use crate::context::Context;
 use crate::shallow::Snapshot;
 use crate::shallow::free_fall::mesh::Balls;
 use crate::shallow::surface::{Depths, Surface};
@@ -19,23 +21,40 @@ pub struct frz_shallow_snapshot {
 }
 
 /// The value of a snapshot's handle.
-pub(in crate::capi) struct Taken {
+pub(in crate::capi) struct SnapshotHandle {
     pub snapshot: Snapshot,
     surface: Surface,
     /// Builds meshes of the liquid in the air.
     pub balls: Balls,
-    /// Minimum heights, if there were any.
+    /// Minimum and sunk depths; empty if they did not match the ground.
     least: Vec<i32>,
     sunk: Vec<i32>,
-    /// Ledges, if there were any.
-    ledged: Ledged,
+    found_ledges: FoundLedges,
 }
 
-impl Taken {
-    /// Takes the minimum heights and the ledges of a liquid, if they match its current ground.
-    fn fit(&mut self, spill: &ShallowHandle) {
-        self.ledged.copy_from(&spill.ledged);
-        let (least, sunk) = spill.lifted.known().unwrap_or_default();
+impl SnapshotHandle {
+    fn new(ctx: &Context, liquid: &ShallowHandle) -> Outcome<Self> {
+        ctx.allow("the snapshot", liquid.shallow.columns().len() as u64 * BYTES_PER_INDEX)?;
+        let snapshot = Snapshot::new(&liquid.shallow);
+        let mut surface = Surface::default();
+        surface.reserve(snapshot.columns());
+        let mut balls = Balls::default();
+        balls.reserve(liquid.shallow.params().falls.map_or(0, |falls| falls.max_packets));
+        let (least, sunk, found_ledges) = Default::default();
+        let mut handle = Self { snapshot, surface, balls, least, sunk, found_ledges };
+        handle.copy_found(liquid);
+        Ok(handle)
+    }
+
+    fn take(&mut self, liquid: &ShallowHandle) {
+        self.snapshot.take(&liquid.shallow);
+        self.copy_found(liquid);
+    }
+
+    /// Copies the minimum heights and the ledges of a liquid, if they match its current ground.
+    fn copy_found(&mut self, liquid: &ShallowHandle) {
+        self.found_ledges.copy_from(&liquid.found_ledges);
+        let (least, sunk) = liquid.found_heights.known().unwrap_or_default();
         self.least.clear();
         self.least.extend_from_slice(least);
         self.sunk.clear();
@@ -43,11 +62,7 @@ impl Taken {
     }
 }
 
-impl HandleType for frz_shallow_snapshot {
-    type Value = Taken;
-    const NAME: &'static str = "snapshot";
-    const TAG: u32 = 0x6672_7a0a;
-}
+handle!(frz_shallow_snapshot, SnapshotHandle, "snapshot", 10);
 
 /// Creates a snapshot of a liquid in its current state.
 ///
@@ -61,32 +76,12 @@ pub unsafe extern "C" fn frz_shallow_snapshot_create(
     out: *mut *mut frz_shallow_snapshot,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    unsafe {
-        creates(context, out, |ctx| {
-            let spill = read(shallow)?;
-            ctx.allow("the snapshot", spill.shallow.columns().len() as u64 * BYTES)?;
-            let snapshot = Snapshot::new(&spill.shallow);
-            let mut surface = Surface::default();
-            surface.reserve(snapshot.columns());
-            let mut balls = Balls::default();
-            balls.reserve(spill.shallow.params().falls.map_or(0, |falls| falls.max_packets));
-            let mut taken = Taken {
-                snapshot,
-                surface,
-                balls,
-                least: Vec::new(),
-                sunk: Vec::new(),
-                ledged: Ledged::default(),
-            };
-            taken.fit(&spill);
-            Ok(taken)
-        })
-    }
+    unsafe { creates(context, out, |ctx| SnapshotHandle::new(ctx, &read(shallow)?)) }
 }
 
 /// Memory (bytes) of a snapshot for each column index: bases, ceilings, undersides, depth, velocity, scalars, minimum heights, and for a
 /// surface.
-const BYTES: u64 = 72;
+const BYTES_PER_INDEX: u64 = 72;
 
 /// Replaces the contents of a snapshot by a liquid's current state (a real-time call: see frz_shallow).
 ///
@@ -100,10 +95,7 @@ pub unsafe extern "C" fn frz_shallow_snapshot_take(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     guard(|| unsafe {
-        let mut taken = change(snapshot)?;
-        let spill = read(shallow)?;
-        taken.snapshot.take(&spill.shallow);
-        taken.fit(&spill);
+        change(snapshot)?.take(&read(shallow)?);
         Ok(())
     })
 }
@@ -137,22 +129,26 @@ pub unsafe extern "C" fn frz_shallow_snapshot_surface(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so are the spans.
     unsafe {
-        writes(context, snapshot, (layout, target, size), |taken, wanted| {
-            let Taken { snapshot, surface, least, sunk, ledged, .. } = taken;
-            let when = "when the snapshot was taken";
-            let known = (!least.is_empty()).then_some((&least[..], &sunk[..]));
-            let (least, sunk) = wanted_lifts(wanted.has(FRZ_SHALLOW_LIFTED), known, when)?;
-            let depths = Depths {
-                depth: snapshot.depths(),
-                velocity: snapshot.velocities(),
-                active: Some(snapshot.active()),
-                least,
-                sunk,
-                carried: std::array::from_fn(|scalar| snapshot.concentrations(scalar)),
-                ledges: ledged.wanted(wanted.has(FRZ_SHALLOW_SKIRTED), when)?,
-            };
-            wanted.write(surface, snapshot.columns(), &depths)
-        })
+        writes(context, snapshot, (layout, target, size), |handle, request| handle.write_surface(request))
+    }
+}
+
+impl SnapshotHandle {
+    fn write_surface(&mut self, request: &MeshRequest<frz_shallow_target>) -> Outcome {
+        let Self { snapshot, surface, least, sunk, found_ledges, .. } = self;
+        let when = "when the snapshot was taken";
+        let known = (!least.is_empty()).then_some((&least[..], &sunk[..]));
+        let (least, sunk) = requested_heights(request.has(FRZ_SHALLOW_LIFTED), known, when)?;
+        let depths = Depths {
+            depth: snapshot.depths(),
+            velocity: snapshot.velocities(),
+            active: Some(snapshot.active()),
+            least,
+            sunk,
+            carried: std::array::from_fn(|scalar| snapshot.concentrations(scalar)),
+            ledges: found_ledges.requested(request.has(FRZ_SHALLOW_SKIRTED), when)?,
+        };
+        request.write(surface, snapshot.columns(), &depths)
     }
 }
 

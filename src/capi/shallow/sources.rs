@@ -1,8 +1,8 @@
 //! Where shallow liquid enters and leaves, and the balance of its volume.
 
-use super::calls::{answers, informs};
+use super::calls::{answer_some, informs};
 use super::flow_points::frz_shallow_flow;
-use super::spill::{ShallowHandle, frz_shallow};
+use super::handle::{ShallowHandle, frz_shallow};
 use crate::capi::ffi::*;
 use crate::shallow::Balance;
 
@@ -22,8 +22,8 @@ pub unsafe extern "C" fn frz_shallow_set_flows(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     guard(|| unsafe {
-        let ShallowHandle { shallow, around, .. } = &mut *change(shallow)?;
-        around.set_flows(flows, count, |points| shallow.set_flows(points, |at| format!("flow {at}")))
+        let ShallowHandle { shallow, surroundings, .. } = &mut *change(shallow)?;
+        surroundings.set_flows(flows, count, |points| shallow.set_flows(points, |at| format!("flow {at}")))
     })
 }
 
@@ -43,7 +43,7 @@ pub unsafe extern "C" fn frz_shallow_flow_moved(
     guard(|| unsafe {
         answer(volume, "volume", || {
             let liquid = read(shallow)?;
-            Ok(liquid.shallow.moved(check_index("flow", flow, liquid.around.flows.len())?))
+            Ok(liquid.shallow.moved(check_index("flow", flow, liquid.surroundings.flows.len())?))
         })
     })
 }
@@ -67,7 +67,7 @@ pub unsafe extern "C" fn frz_shallow_pour(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     guard(|| unsafe {
-        answers(poured, || {
+        answer_some(poured, || {
             let mut liquid = change(shallow)?;
             let at = numbers(at, "at")?;
             finite("volume", volume)?;
@@ -105,14 +105,14 @@ pub unsafe extern "C" fn frz_shallow_set_depths(shallow: *mut frz_shallow, depth
     guard(|| unsafe {
         let shallow = &mut change(shallow)?.shallow;
         let (count, heights) = (shallow.columns().len(), shallow.columns().heights);
-        let wanted = one_for_each::<f32>(&depths, "depths", count, ["there are", "column indices"])?;
+        let given = one_for_each::<f32>(&depths, "depths", count, ["there are", "column indices"])?;
         let is_bad = |&(index, depth): &(usize, f32)| {
             shallow.columns().is_column(index) && !(depth >= 0.0 && depth.is_finite())
         };
-        if let Some((at, depth)) = wanted.clone().enumerate().find(is_bad) {
+        if let Some((at, depth)) = given.clone().enumerate().find(is_bad) {
             return Err(Failure::argument(format!("depths: element {at}, {depth} m, is not 0 or more")));
         }
-        for (index, depth) in wanted.enumerate() {
+        for (index, depth) in given.enumerate() {
             if shallow.columns().is_column(index) {
                 let now = heights.length(f64::from(shallow.depths()[index]));
                 shallow.pour(index, f64::from(depth) - now);
@@ -153,11 +153,7 @@ pub struct frz_shallow_balance {
     pub falling: f64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_shallow_balance {
-    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_shallow_balance, falling), size_of::<Self>()];
-    const NAME: &'static str = "frz_shallow_balance";
-}
+sized32!(frz_shallow_balance, [falling]);
 
 fields_of!(Balance => frz_shallow_balance {
     inside, poured, sourced, drained, absorbed, lost, gained, held, error, falling

@@ -1,10 +1,10 @@
-//! What shallow liquid leaves on the ground: stains, and what the ground absorbs.
+//! Stains that shallow liquid leaves on the ground, and the liquid that the ground absorbs.
 
 use std::ffi::c_void;
 
-use super::calls::answers;
+use super::calls::answer_some;
+use super::handle::frz_shallow;
 use super::params::FRZ_SHALLOW_NO_SCALAR;
-use super::spill::frz_shallow;
 use crate::capi::ffi::saved::{restores, write_bytes};
 use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
@@ -38,14 +38,7 @@ pub struct frz_shallow_staining {
     pub rate: f64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_shallow_staining {
-    const NAME: &'static str = "frz_shallow_staining";
-
-    fn defaults() -> Self {
-        Self { scalar: FRZ_SHALLOW_NO_SCALAR, ..Staining::default().into() }
-    }
-}
+sized32!(frz_shallow_staining, [], Self { scalar: FRZ_SHALLOW_NO_SCALAR, ..Staining::default().into() });
 
 fields_of!(Staining <=> frz_shallow_staining { film, takes, half_life });
 
@@ -86,17 +79,13 @@ pub struct frz_shallow_stains {
 }
 
 /// The value of the handle of stains.
-pub(in crate::capi) struct Stained {
+pub(in crate::capi) struct StainsHandle {
     stains: Stains,
-    /// Incoming positions.
+    /// The vertices' positions (m) of the last update.
     positions: Vec<Vec3>,
 }
 
-impl HandleType for frz_shallow_stains {
-    type Value = Stained;
-    const NAME: &'static str = "stains";
-    const TAG: u32 = 0x6672_7a0b;
-}
+handle!(frz_shallow_stains, StainsHandle, "stains", 11);
 
 /// Creates stains: none yet, and nothing absorbed.
 ///
@@ -120,19 +109,19 @@ pub unsafe extern "C" fn frz_shallow_stains_create(
     unsafe {
         creates(context, out, |ctx| {
             let staining = given_or_defaults(staining)?.staining()?;
-            let spill = read(shallow)?;
+            let liquid = read(shallow)?;
             let vertices = positions.count as u64;
-            ctx.allow("the stains", vertices.saturating_mul(BYTES))?;
+            ctx.allow("the stains", vertices.saturating_mul(BYTES_PER_VERTEX))?;
             let positions: Vec<Vec3> = positions.finite("positions")?.into_iter().map(Vec3::from).collect();
             let triangles = triangles.elements::<[u32; 3]>("triangles")?;
-            let stains = Stains::new(&spill.shallow, &positions, &triangles, staining)?;
-            Ok(Stained { stains, positions })
+            let stains = Stains::new(&liquid.shallow, &positions, &triangles, staining)?;
+            Ok(StainsHandle { stains, positions })
         })
     }
 }
 
 /// Memory (bytes) of a vertex: its stain, when it was wet, its content and capacity, and its position, twice while it is read.
-const BYTES: u64 = 52;
+const BYTES_PER_VERTEX: u64 = 52;
 
 /// Lets the liquid stain the ground, and the ground absorb liquid, for the time since the last call, once a frame (a real-time call: see
 /// frz_shallow).
@@ -152,16 +141,16 @@ pub unsafe extern "C" fn frz_shallow_stains_update(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so is the view.
     guard(|| unsafe {
-        answers(absorbed, || {
+        answer_some(absorbed, || {
             let _call = enter_light(context)?;
-            let Stained { stains, positions: own } = &mut *change(stains)?;
-            let mut spill = change(shallow)?;
+            let StainsHandle { stains, positions: own } = &mut *change(stains)?;
+            let mut liquid = change(shallow)?;
             let count = stains.len();
             let given =
                 one_for_each::<[f32; 3]>(&positions, "positions", count, ["the mesh has", "vertices"])?;
             own.clear();
             own.extend(given.map(Vec3::from));
-            Ok(stains.update(&mut spill.shallow, own)?)
+            Ok(stains.update(&mut liquid.shallow, own)?)
         })
     })
 }
@@ -249,7 +238,7 @@ pub unsafe extern "C" fn frz_shallow_stains_restore(
     bytes: usize,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so are the bytes.
-    unsafe { restores(context, stains, (state, bytes), |stained, state| stained.stains.restore(state)) }
+    unsafe { restores(context, stains, (state, bytes), |handle, state| handle.stains.restore(state)) }
 }
 
 /// Destroys stains; NULL is ignored.

@@ -1,8 +1,8 @@
-//! States of shallow liquid that a host saves and restores in place.
+//! Saves and restores states of shallow liquid, in place.
 
 use std::ffi::c_void;
 
-use super::spill::frz_shallow;
+use super::handle::frz_shallow;
 use crate::capi::ffi::saved::{restores, saves_in_place};
 use crate::capi::ffi::*;
 use crate::capi::runtime::context::frz_context;
@@ -29,8 +29,8 @@ pub unsafe extern "C" fn frz_shallow_save(
             context,
             shallow,
             (dst, capacity, size),
-            |spill| spill.shallow.save_size(),
-            |spill, room| spill.shallow.save_to(room),
+            |liquid| liquid.shallow.save_size(),
+            |liquid, room| liquid.shallow.save_to(room),
         )
     }
 }
@@ -51,5 +51,5 @@ pub unsafe extern "C" fn frz_shallow_restore(
     bytes: usize,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so are the bytes.
-    unsafe { restores(context, shallow, (state, bytes), |spill, state| spill.shallow.restore(state)) }
+    unsafe { restores(context, shallow, (state, bytes), |liquid, state| liquid.shallow.restore(state)) }
 }

@@ -2,7 +2,7 @@
 
 use super::calls::changes;
 use super::ground::{cells_in, read_heights};
-use super::spill::{ShallowHandle, frz_shallow};
+use super::handle::{ShallowHandle, frz_shallow};
 use crate::capi::ffi::*;
 use crate::capi::runtime::context::frz_context;
 use crate::geometry::DVec3;
@@ -28,10 +28,7 @@ pub struct frz_shallow_moved {
     pub fallen: f64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_shallow_moved {
-    const NAME: &'static str = "frz_shallow_moved";
-}
+sized32!(frz_shallow_moved);
 
 fields_of!(Moved => frz_shallow_moved { cells, displaced, held, fallen });
 
@@ -54,16 +51,16 @@ pub unsafe extern "C" fn frz_shallow_update_terrain(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so is the view.
     unsafe {
-        changes(context, shallow, moved, |_, spill| {
-            let ShallowHandle { shallow, around, .. } = &mut *spill;
+        changes(context, shallow, moved, |_, liquid| {
+            let ShallowHandle { shallow, surroundings, .. } = &mut *liquid;
             let cells = cells_in(&shallow.columns().grid, bounds)?;
-            let mesh = around.terrain.mesh()?;
-            mesh.take(&positions)?;
-            mesh.caster.cast(&mesh.coming, &mesh.triangles, cells.clone())?;
+            let mesh = surroundings.terrain.mesh()?;
+            mesh.read_positions(&positions)?;
+            mesh.caster.cast(&mesh.incoming, &mesh.triangles, cells.clone())?;
             let moved = shallow.update_cells(cells, |cell| mesh.caster.at(cell))?;
-            mesh.come();
-            around.carry_flows(|flow, at| shallow.move_flow(flow, at))?;
-            Ok(spill.after(moved))
+            mesh.adopt_incoming();
+            surroundings.carry_flows(|flow, at| shallow.move_flow(flow, at))?;
+            Ok(liquid.ground_changed(moved))
         })
     }
 }
@@ -86,14 +83,14 @@ pub unsafe extern "C" fn frz_shallow_update_heights(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so is the view.
     unsafe {
-        changes(context, shallow, moved, |_, spill| {
-            let ShallowHandle { shallow, around, .. } = &mut *spill;
+        changes(context, shallow, moved, |_, liquid| {
+            let ShallowHandle { shallow, surroundings, .. } = &mut *liquid;
             let (grid, range) = (shallow.columns().grid, shallow.columns().heights);
             let cells = cells_in(&grid, bounds)?;
-            let solids = around.terrain.heights()?;
+            let solids = surroundings.terrain.heights()?;
             read_heights(&heights, &grid, &range, cells.clone(), solids)?;
             let moved = shallow.update_cells(cells, |cell| &solids[cell])?;
-            Ok(spill.after(moved))
+            Ok(liquid.ground_changed(moved))
         })
     }
 }
@@ -146,13 +143,24 @@ pub struct frz_shallow_body {
     pub axes: [[f64; 3]; 3],
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_shallow_body {
-    const NAME: &'static str = "frz_shallow_body";
+sized32!(frz_shallow_body);
+
+/// Replaces shapes by those of a host's bodies.
+///
+/// # Safety
+/// As [`read_list`].
+pub(in crate::capi) unsafe fn read_bodies(
+    bodies: *const frz_shallow_body,
+    count: usize,
+    shapes: &mut Vec<Shape>,
+) -> Outcome<&[Shape]> {
+    // SAFETY: guaranteed by the caller.
+    unsafe { read_list(bodies, count, ["body", "bodies"], shapes, frz_shallow_body::shape) }?;
+    Ok(shapes)
 }
 
 impl frz_shallow_body {
-    pub(in crate::capi) fn shape(self) -> Outcome<Shape> {
+    fn shape(self) -> Outcome<Shape> {
         let shape = meaning("shape", "frz_shallow_shape", self.shape, &SHAPES)?(&self);
         shape.validate()?;
         Ok(shape)
@@ -179,11 +187,10 @@ pub unsafe extern "C" fn frz_shallow_set_bodies(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     unsafe {
-        changes(context, shallow, moved, |_, spill| {
-            let ShallowHandle { shallow, around, .. } = &mut *spill;
-            read_list(bodies, count, ["body", "bodies"], &mut around.shapes, frz_shallow_body::shape)?;
-            let moved = shallow.set_bodies(&around.shapes)?;
-            Ok(spill.after(moved))
+        changes(context, shallow, moved, |_, liquid| {
+            let moved =
+                liquid.shallow.set_bodies(read_bodies(bodies, count, &mut liquid.surroundings.shapes)?)?;
+            Ok(liquid.ground_changed(moved))
         })
     }
 }

@@ -9,9 +9,11 @@ use crate::capi::runtime::context::frz_context;
 use crate::capi::shallow::calls::{changes, informs};
 use crate::capi::shallow::ground::{all_cells, read_heights};
 use crate::capi::shallow::surface::{
-    FRZ_SHALLOW_LIFTED, FRZ_SHALLOW_SKIRTED, frz_shallow_layout, frz_shallow_size, frz_shallow_target, writes,
+    FRZ_SHALLOW_LIFTED, FRZ_SHALLOW_SKIRTED, MeshRequest, frz_shallow_layout, frz_shallow_size,
+    frz_shallow_target, writes,
 };
-use crate::capi::shallow::terrain::{frz_shallow_body, frz_shallow_moved};
+use crate::capi::shallow::terrain::{frz_shallow_body, frz_shallow_moved, read_bodies};
+use crate::shallow::Moved;
 use crate::shallow::terrain::Solids;
 use crate::shallow::two_level::surface::bound;
 
@@ -30,19 +32,7 @@ pub unsafe extern "C" fn frz_shallow_detail_update_terrain(
     moved: *mut frz_shallow_moved,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so is the view.
-    unsafe {
-        changes(context, detail, moved, |_, spread| {
-            let DetailHandle { detail, around, .. } = spread;
-            let columns = detail.fine().columns();
-            let mesh = around.terrain.mesh()?;
-            mesh.take(&positions)?;
-            let solids = mesh.cast(columns.grid, columns.heights)?;
-            let moved = detail.update_terrain(&solids)?;
-            mesh.come();
-            around.carry_flows(|flow, at| detail.move_flow(flow, at))?;
-            Ok(moved)
-        })
-    }
+    unsafe { changes(context, detail, moved, |_, liquid| liquid.update_terrain(&positions)) }
 }
 
 /// Changes the heights of the height field that the liquid was created with, as frz_shallow_update_heights does, everywhere. After a
@@ -60,16 +50,36 @@ pub unsafe extern "C" fn frz_shallow_detail_update_heights(
     moved: *mut frz_shallow_moved,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so is the view.
-    unsafe {
-        changes(context, detail, moved, |_, spread| {
-            let DetailHandle { detail, around, .. } = spread;
-            let (grid, range) = (detail.fine().columns().grid, detail.fine().columns().heights);
-            let own = around.terrain.heights()?;
-            read_heights(&heights, &grid, &range, all_cells(&grid), own)?;
-            let mut solids = Solids::empty(grid, range);
-            own.iter().for_each(|solid| solids.push(solid));
-            Ok(detail.update_terrain(&solids)?)
-        })
+    unsafe { changes(context, detail, moved, |_, liquid| liquid.update_heights(&heights)) }
+}
+
+impl DetailHandle {
+    /// # Safety
+    /// The view must describe memory that can be read.
+    unsafe fn update_terrain(&mut self, positions: &frz_view) -> Outcome<Moved> {
+        let Self { detail, surroundings, .. } = self;
+        let columns = detail.fine().columns();
+        let mesh = surroundings.terrain.mesh()?;
+        // SAFETY: guaranteed by the caller.
+        unsafe { mesh.read_positions(positions) }?;
+        let solids = mesh.cast(columns.grid, columns.heights)?;
+        let moved = detail.update_terrain(&solids)?;
+        mesh.adopt_incoming();
+        surroundings.carry_flows(|flow, at| detail.move_flow(flow, at))?;
+        Ok(moved)
+    }
+
+    /// # Safety
+    /// As [`DetailHandle::update_terrain`].
+    unsafe fn update_heights(&mut self, heights: &frz_view) -> Outcome<Moved> {
+        let Self { detail, surroundings, .. } = self;
+        let (grid, range) = (detail.fine().columns().grid, detail.fine().columns().heights);
+        let own = surroundings.terrain.heights()?;
+        // SAFETY: guaranteed by the caller.
+        unsafe { read_heights(heights, &grid, &range, all_cells(&grid), own) }?;
+        let mut solids = Solids::empty(grid, range);
+        own.iter().for_each(|solid| solids.push(solid));
+        Ok(detail.update_terrain(&solids)?)
     }
 }
 
@@ -91,10 +101,8 @@ pub unsafe extern "C" fn frz_shallow_detail_set_bodies(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     unsafe {
-        changes(context, detail, moved, |_, spread| {
-            let shapes = &mut spread.around.shapes;
-            read_list(bodies, count, ["body", "bodies"], shapes, frz_shallow_body::shape)?;
-            Ok(spread.detail.set_bodies(shapes)?)
+        changes(context, detail, moved, |_, DetailHandle { detail, surroundings, .. }| {
+            Ok(detail.set_bodies(read_bodies(bodies, count, &mut surroundings.shapes)?)?)
         })
     }
 }
@@ -133,23 +141,27 @@ pub unsafe extern "C" fn frz_shallow_detail_surface(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so are the spans.
     unsafe {
-        writes(context, detail, (layout, target, size), |spread, wanted| {
-            let DetailHandle { detail, surface, shown: [fine, coarse], is_reserved, .. } = spread;
-            for (flag, name) in
-                [(FRZ_SHALLOW_LIFTED, "FRZ_SHALLOW_LIFTED"), (FRZ_SHALLOW_SKIRTED, "FRZ_SHALLOW_SKIRTED")]
-            {
-                refuse(wanted.has(flag), || format!("{name} is not for liquid in cells of two sizes"))?;
-            }
-            if !*is_reserved {
-                surface.reserve(detail);
-                *is_reserved = true;
-            }
-            let needs = wanted.needs();
-            let depths = [fine.depths(detail.fine(), &needs)?, coarse.depths(detail.coarse(), &needs)?];
-            wanted.write_with(|target| match target {
-                Some(target) => surface.build(detail, depths.each_ref(), &wanted.layout, target),
-                None => surface.count(detail, depths.each_ref()),
-            })
+        writes(context, detail, (layout, target, size), |liquid, request| liquid.write_surface(request))
+    }
+}
+
+impl DetailHandle {
+    fn write_surface(&mut self, request: &MeshRequest<frz_shallow_target>) -> Outcome {
+        let Self { detail, surface, flow_fields: [fine, coarse], is_reserved, .. } = self;
+        for (flag, name) in
+            [(FRZ_SHALLOW_LIFTED, "FRZ_SHALLOW_LIFTED"), (FRZ_SHALLOW_SKIRTED, "FRZ_SHALLOW_SKIRTED")]
+        {
+            refuse(request.has(flag), || format!("{name} is not for liquid in cells of two sizes"))?;
+        }
+        if !*is_reserved {
+            surface.reserve(detail);
+            *is_reserved = true;
+        }
+        let needed = request.needed_fields();
+        let depths = [fine.depths(detail.fine(), &needed)?, coarse.depths(detail.coarse(), &needed)?];
+        request.write_with(|target| match target {
+            Some(target) => surface.build(detail, depths.each_ref(), &request.layout, target),
+            None => surface.count(detail, depths.each_ref()),
         })
     }
 }
@@ -176,8 +188,8 @@ pub unsafe extern "C" fn frz_shallow_detail_save(
             context,
             detail,
             (dst, capacity, size),
-            |spread| spread.detail.save_size(),
-            |spread, room| spread.detail.save_to(room),
+            |liquid| liquid.detail.save_size(),
+            |liquid, room| liquid.detail.save_to(room),
         )
     }
 }
@@ -198,10 +210,10 @@ pub unsafe extern "C" fn frz_shallow_detail_restore(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so are the bytes.
     unsafe {
-        restores(context, detail, (state, bytes), |spread, state| {
-            let near = spread.detail.near().clone();
-            spread.detail.restore(state)?;
-            spread.is_reserved &= near == *spread.detail.near();
+        restores(context, detail, (state, bytes), |liquid, state| {
+            let near = liquid.detail.near().clone();
+            liquid.detail.restore(state)?;
+            liquid.is_reserved &= near == *liquid.detail.near();
             Ok(())
         })
     }

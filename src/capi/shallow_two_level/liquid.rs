@@ -2,15 +2,14 @@
 
 use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::frz_mesh;
-use crate::capi::runtime::context::{creates, frz_context};
-use crate::capi::shallow::calls::{answers, changes, informs};
+use crate::capi::runtime::context::frz_context;
+use crate::capi::shallow::calls::{answer_some, changes, informs};
 use crate::capi::shallow::flow_points::frz_shallow_flow;
-use crate::capi::shallow::ground::Terrain;
 use crate::capi::shallow::liquid::frz_shallow_report;
 use crate::capi::shallow::params::{frz_shallow_domain, frz_shallow_params};
 use crate::capi::shallow::sources::frz_shallow_balance;
-use crate::capi::shallow::surface::prepared::Shown;
-use crate::capi::shallow::surroundings::{Setup, Surroundings};
+use crate::capi::shallow::surface::prepared::FlowFields;
+use crate::capi::shallow::surroundings::{Ground, Setup, Surroundings, creates_on};
 use crate::context::Context;
 use crate::shallow::Detail;
 use crate::shallow::two_level::cells_around;
@@ -28,20 +27,16 @@ pub struct frz_shallow_detail {
 /// The value of a handle.
 pub(in crate::capi) struct DetailHandle {
     pub detail: Detail,
-    /// What it flows over, and what is set in it.
-    pub around: Surroundings,
-    /// Builds surfaces; whether it has room for the current columns.
+    pub surroundings: Surroundings,
+    /// Builds surfaces of this liquid.
     pub surface: Surface,
+    /// Whether `surface` has room for the current columns.
     pub is_reserved: bool,
-    /// What surfaces show of the flow in cells of both sizes.
-    pub shown: [Shown; 2],
+    /// Velocities and concentrations for surfaces, in small cells and in large ones.
+    pub flow_fields: [FlowFields; 2],
 }
 
-impl HandleType for frz_shallow_detail {
-    type Value = DetailHandle;
-    const NAME: &'static str = "shallow liquid in cells of two sizes";
-    const TAG: u32 = 0x6672_7a0c;
-}
+handle!(frz_shallow_detail, DetailHandle, "shallow liquid in cells of two sizes", 12);
 
 impl DetailHandle {
     /// Dry ground, with a box of small cells.
@@ -54,8 +49,12 @@ impl DetailHandle {
         let detail = ctx.phase("columns", || Detail::new(ctx, &setup.solids, setup.params, near))?;
         let mut surface = Surface::default();
         surface.reserve(&detail);
-        let around = Surroundings::new(setup.terrain);
-        Ok(Self { detail, around, surface, is_reserved: true, shown: Default::default() })
+        let surroundings = Surroundings::new(setup.terrain);
+        Ok(Self { detail, surroundings, surface, is_reserved: true, flow_fields: Default::default() })
+    }
+
+    fn step(&mut self, ctx: &Context, dt: f64) -> Outcome<frz_shallow_report> {
+        Ok(frz_shallow_report::of(self.detail.step(ctx, dt)?, dt))
     }
 }
 
@@ -80,9 +79,8 @@ pub unsafe extern "C" fn frz_shallow_detail_create(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     unsafe {
-        creates(context, out, |ctx| {
-            let terrain = |grid, range| Terrain::of_mesh(ctx, &read(mesh)?.triangles, grid, range);
-            DetailHandle::new(ctx, Setup::new(ctx, params, domain, terrain)?, near)
+        creates_on(context, (params, domain, Ground::Mesh(mesh)), out, |ctx, setup| {
+            DetailHandle::new(ctx, setup, near)
         })
     }
 }
@@ -107,9 +105,8 @@ pub unsafe extern "C" fn frz_shallow_detail_create_heights(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     unsafe {
-        creates(context, out, |ctx| {
-            let terrain = |grid, range| Terrain::of_heights(heights.in_place::<f32>("heights")?, grid, range);
-            DetailHandle::new(ctx, Setup::new(ctx, params, domain, terrain)?, near)
+        creates_on(context, (params, domain, Ground::Heights(heights)), out, |ctx, setup| {
+            DetailHandle::new(ctx, setup, near)
         })
     }
 }
@@ -172,8 +169,8 @@ pub unsafe extern "C" fn frz_shallow_detail_get_near(
     // SAFETY: the pointers are NULL or valid.
     guard(|| unsafe {
         answer(near.cast::<[f64; 4]>(), "near", || {
-            let spread = read(detail)?;
-            let ([x, z], grid) = (spread.detail.near(), spread.detail.fine().columns().grid);
+            let liquid = read(detail)?;
+            let ([x, z], grid) = (liquid.detail.near(), liquid.detail.fine().columns().grid);
             let at = |axis: usize, cell: usize| grid.origin[axis] + cell as f64 * grid.cell;
             Ok([at(0, x.start), at(1, z.start), at(0, x.end), at(1, z.end)])
         })
@@ -194,11 +191,7 @@ pub unsafe extern "C" fn frz_shallow_detail_step(
     report: *mut frz_shallow_report,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    unsafe {
-        changes(context, detail, report, |ctx, spread| {
-            Ok(frz_shallow_report::of(spread.detail.step(ctx, dt)?, dt))
-        })
-    }
+    unsafe { changes(context, detail, report, |ctx, liquid| liquid.step(ctx, dt)) }
 }
 
 /// Sets sources, drains and absorbers, as frz_shallow_set_flows does. Each acts on cells of the size at its centre.
@@ -215,8 +208,8 @@ pub unsafe extern "C" fn frz_shallow_detail_set_flows(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     guard(|| unsafe {
-        let DetailHandle { detail, around, .. } = &mut *change(detail)?;
-        around.set_flows(flows, count, |points| detail.set_flows(points, |at| format!("flow {at}")))
+        let DetailHandle { detail, surroundings, .. } = &mut *change(detail)?;
+        surroundings.set_flows(flows, count, |points| detail.set_flows(points, |at| format!("flow {at}")))
     })
 }
 
@@ -252,7 +245,7 @@ pub unsafe extern "C" fn frz_shallow_detail_flow_moved(
     guard(|| unsafe {
         answer(volume, "volume", || {
             let liquid = read(detail)?;
-            Ok(liquid.detail.moved(check_index("flow", flow, liquid.around.flows.len())?))
+            Ok(liquid.detail.moved(check_index("flow", flow, liquid.surroundings.flows.len())?))
         })
     })
 }
@@ -275,7 +268,7 @@ pub unsafe extern "C" fn frz_shallow_detail_pour(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     guard(|| unsafe {
-        answers(poured, || {
+        answer_some(poured, || {
             let mut liquid = change(detail)?;
             let at = numbers(at, "at")?;
             finite("volume", volume)?;

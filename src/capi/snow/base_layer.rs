@@ -1,4 +1,4 @@
-//! The base layer, the first of the objects with steps; the others follow the same pattern.
+//! The base layer. The other objects that are moved in steps follow the same pattern.
 
 use std::ffi::c_void;
 use std::ptr::NonNull;
@@ -34,15 +34,11 @@ pub struct frz_base_params {
     pub noise: frz_noise,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_base_params {
-    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_base_params, noise), size_of::<Self>()];
-    const NAME: &'static str = "frz_base_params";
-
-    fn defaults() -> Self {
-        Self { tolerance: TOLERANCE, noise: frz_noise::USUAL, ..Self::zeroed() }
-    }
-}
+sized32!(
+    frz_base_params,
+    [noise],
+    Self { tolerance: TOLERANCE, noise: frz_noise::DEFAULTS, ..Self::zeroed() }
+);
 
 impl frz_base_params {
     /// The library's own parameters for voxels of a size (m).
@@ -71,33 +67,24 @@ pub struct frz_base_report {
     pub sweep_faces: u64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_base_report {
-    const SIZES: &'static [usize] =
-        &[std::mem::offset_of!(frz_base_report, touched_blocks), size_of::<Self>()];
-    const NAME: &'static str = "frz_base_report";
-}
+sized32!(frz_base_report, [touched_blocks]);
 
 fields_of!(StepReport => frz_base_report { removed_volume, base_volume, touched_blocks, sweep_faces });
 
-/// Grids that a base layer lends: snow, removed, compression, touched.
+/// Number of grids that a base layer lends: snow, removed, compression, touched.
 const LENT: usize = 4;
 
 /// The value of a base layer's handle.
-pub(in crate::capi) struct Layer {
+pub(in crate::capi) struct BaseHandle {
     pub layer: Box<BaseLayer>,
     shapes: Shapes,
     lent: [*mut frz_grid; LENT],
     dirty: Vec<Origin>,
 }
 
-impl HandleType for frz_base {
-    type Value = Layer;
-    const NAME: &'static str = "base layer";
-    const TAG: u32 = 0x6672_7a05;
-}
+handle!(frz_base, BaseHandle, "base layer", 5);
 
-impl Layer {
+impl BaseHandle {
     fn new(layer: BaseLayer) -> Outcome<Self> {
         let mut state = Self {
             layer: Box::new(layer),
@@ -117,8 +104,8 @@ impl Layer {
         [self.layer.surface(), self.layer.removed(), self.layer.compression(), self.layer.touched()]
     }
 
-    /// Runs `work` while the lent grids are not in use, and lends them again.
-    fn alone<T>(&mut self, work: impl FnOnce(&mut Self) -> Outcome<T>) -> Outcome<T> {
+    /// Runs `work` while the lent grids are locked, and then lends the current ones.
+    fn with_grids_locked<T>(&mut self, work: impl FnOnce(&mut Self) -> Outcome<T>) -> Outcome<T> {
         // SAFETY: the handles live as long as `self`.
         let mut held = self.lent.map(|grid| unsafe { change(grid) });
         if let Some(Err(_)) = held.iter().find(|held| held.is_err()) {
@@ -133,10 +120,10 @@ impl Layer {
     }
 }
 
-impl Drop for Layer {
+impl Drop for BaseHandle {
     fn drop(&mut self) {
         for grid in self.lent {
-            // SAFETY: made in `new`; the layer is destroyed only when they are not in use.
+            // SAFETY: made in `new`; `frz_base_destroy` has locked them.
             unsafe { free(grid) };
         }
     }
@@ -186,7 +173,7 @@ pub unsafe extern "C" fn frz_base_create(
                 true => BaseLayer::new(ctx, snow.deep_copy()?, params),
                 false => BaseLayer::restore(ctx, snow.deep_copy()?, params, &state),
             })?;
-            Layer::new(layer)
+            BaseHandle::new(layer)
         })
     }
 }
@@ -199,7 +186,7 @@ pub unsafe extern "C" fn frz_base_create(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_base_destroy(base: *mut frz_base) {
     // SAFETY: the layer is NULL or alive.
-    guard(|| unsafe { destroy_whole(base, |layer: &Layer| layer.lent.to_vec()) });
+    guard(|| unsafe { destroy_whole(base, |layer: &BaseHandle| layer.lent.to_vec()) });
 }
 
 /// Sets how bodies press from the next step on. All parameters may change between steps; the voxels and the snow itself are not parameters
@@ -249,7 +236,7 @@ pub unsafe extern "C" fn frz_base_step(
             refuse(frame.unsigned_abs() > 1 << 24, || {
                 format!("frame = {frame} is not within -16777216 to 16777216")
             })?;
-            base.alone(|state| {
+            base.with_grids_locked(|state| {
                 let bodies = self::bodies(ctx, bodies, count, dt, Role::Sweep, &mut state.shapes)?;
                 let bodies: Vec<Body> = bodies.into_iter().map(|(body, _)| body).collect();
                 let done = state.layer.step(ctx, &bodies, 0.0, dt, frame)?;

@@ -4,7 +4,7 @@ use std::ffi::c_void;
 
 use super::base_layer::frz_base;
 use super::grains_params::{FRZ_GRAINS_FLOOR, frz_grains_params};
-use crate::capi::ffi::saved::{Saved, resumed};
+use crate::capi::ffi::saved::{Restart, Saved, new_or_resumed};
 use crate::capi::ffi::*;
 use crate::capi::grid::sparse::frz_grid;
 use crate::capi::level_set::body::{Role, Shapes, bodies, frz_body};
@@ -54,37 +54,53 @@ pub struct frz_grains_report {
     pub fastest: f64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_grains_report {
-    const NAME: &'static str = "frz_grains_report";
-}
+sized32!(frz_grains_report);
 
 fields_of!(StepReport => frz_grains_report {
     sub_steps, count, resting, born, dropped, expired, trapped, removed_volume, owed, fastest
 });
 
-/// What lies below the grains.
+/// Limits below the grains.
 #[derive(Clone, Copy)]
 struct Ground {
+    /// Height of a level ground (m).
     floor: Option<f64>,
+    /// Height (m) below which grains are removed.
     lowest: f64,
 }
 
 /// The value of a handle of grains.
-pub(in crate::capi) struct Heap {
+pub(in crate::capi) struct GrainsHandle {
     pub grains: Grains,
     ground: Ground,
     shapes: Shapes,
     pub saved: Saved,
 }
 
-impl HandleType for frz_grains {
-    type Value = Heap;
-    const NAME: &'static str = "grains handle";
-    const TAG: u32 = 0x6672_7a06;
-}
+handle!(frz_grains, GrainsHandle, "grains handle", 6);
 
-impl Heap {
+impl GrainsHandle {
+    /// New grains, or those of a saved state.
+    ///
+    /// # Safety
+    /// The pointers must be NULL or valid.
+    unsafe fn new(ctx: &Context, params: *const frz_grains_params, restart: Restart) -> Outcome<Self> {
+        // SAFETY: guaranteed by the caller.
+        unsafe {
+            let params = given_or_defaults(params)?;
+            let own = params.params()?;
+            let (new, resume) = (|| Ok(Grains::new(own)?), |state: &[u8]| Grains::resume(own, state));
+            let grains = new_or_resumed(ctx, "grains", restart, new, Grains::unpacked, resume)?;
+            Ok(Self { grains, ground: params.ground(), shapes: Shapes::new(), saved: Saved::default() })
+        }
+    }
+
+    fn set_params(&mut self, params: &frz_grains_params) -> Outcome {
+        self.grains.set_params(params.params()?)?;
+        self.ground = params.ground();
+        Ok(())
+    }
+
     /// Moves the grains through a step.
     ///
     /// # Safety
@@ -97,8 +113,8 @@ impl Heap {
         dt: f64,
         frame: i32,
     ) -> Outcome<frz_grains_report> {
-        within("dt", dt, 0.0..=LONGEST, " s")?;
-        refuse(dt > 0.0 && dt < SHORTEST, || format!("dt = {dt} is not 0, and less than {SHORTEST} s"))?;
+        within("dt", dt, 0.0..=MAX_DT, " s")?;
+        refuse(dt > 0.0 && dt < MIN_DT, || format!("dt = {dt} is not 0, and less than {MIN_DT} s"))?;
         if let Some(snow) = base.after() {
             check_size(self.grains.params().radius, snow.voxel_size())?;
         }
@@ -121,10 +137,10 @@ impl Heap {
     }
 }
 
-/// Minimum and maximum length of a step (s), besides 0.
-const SHORTEST: f64 = 1.0e-6;
-/// As above.
-const LONGEST: f64 = 3600.0;
+/// Minimum length of a step (s), besides 0.
+const MIN_DT: f64 = 1.0e-6;
+/// Maximum length of a step (s).
+const MAX_DT: f64 = 3600.0;
 /// Minimum and maximum radius of a grain in voxels of the base layer.
 const RADII: [f64; 2] = [0.02, 0.5];
 
@@ -168,18 +184,7 @@ pub unsafe extern "C" fn frz_grains_create(
     out: *mut *mut frz_grains,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    unsafe {
-        creates(context, out, |ctx| {
-            let params = given_or_defaults(params)?;
-            let own = params.params()?;
-            let state = frz_view::packed(restart, restart_bytes).elements::<u8>("restart")?;
-            let grains = match restart.is_null() {
-                true => Grains::new(own)?,
-                false => resumed(ctx, "grains", Grains::unpacked(&state), || Grains::resume(own, &state))?,
-            };
-            Ok(Heap { grains, ground: params.ground(), shapes: Shapes::new(), saved: Saved::default() })
-        })
-    }
+    unsafe { creates(context, out, |ctx| GrainsHandle::new(ctx, params, (restart, restart_bytes))) }
 }
 
 /// Destroys grains; NULL is ignored.
@@ -204,13 +209,7 @@ pub unsafe extern "C" fn frz_grains_set_params(
     params: *const frz_grains_params,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    guard(|| unsafe {
-        let mut grains = change(grains)?;
-        let params = given(params)?;
-        grains.grains.set_params(params.params()?)?;
-        grains.ground = params.ground();
-        Ok(())
-    })
+    guard(|| unsafe { change(grains)?.set_params(&given(params)?) })
 }
 
 /// Moves grains through a step, and adds those born from the snow that the base layer's last step removed.

@@ -6,18 +6,6 @@ use crate::geometry::DVec3;
 use crate::snow::grains::Params;
 use crate::snow::{grain_cohesion, grain_friction};
 
-/// Flag of frz_grains_params: there is a level ground at frz_grains_params.floor.
-pub const FRZ_GRAINS_FLOOR: u32 = 1;
-
-/// Flag of frz_grains_params: grains never come to rest.
-pub const FRZ_GRAINS_RESTLESS: u32 = 2;
-
-/// Flag of frz_grains_params: grains outside the box from frz_grains_params.keep_low to keep_high are removed.
-pub const FRZ_GRAINS_BOX: u32 = 4;
-
-/// Flag of frz_grains_params: grains among others feel less of the air than those of a thin spray.
-pub const FRZ_GRAINS_AIR_BY_DENSITY: u32 = 8;
-
 /// How snow becomes grains and how they behave. All parameters but the radius may change between steps.
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -65,18 +53,22 @@ pub struct frz_grains_params {
     pub active_distance: f64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_grains_params {
-    const SIZES: &'static [usize] =
-        &[std::mem::offset_of!(frz_grains_params, active_distance), size_of::<Self>()];
-    const NAME: &'static str = "frz_grains_params";
+sized32!(frz_grains_params, [active_distance], {
+    let params = Params::for_cell(0.01);
+    Self { lowest: -FARTHEST, max_grains: params.max_grains as u64, ..params.into() }
+});
 
-    /// For voxels of 1 cm.
-    fn defaults() -> Self {
-        let params = Params::for_cell(0.01);
-        Self { lowest: -FARTHEST, max_grains: params.max_grains as u64, ..params.into() }
-    }
-}
+/// Flag of frz_grains_params: there is a level ground at frz_grains_params.floor.
+pub const FRZ_GRAINS_FLOOR: u32 = 1;
+
+/// Flag of frz_grains_params: grains never come to rest.
+pub const FRZ_GRAINS_RESTLESS: u32 = 2;
+
+/// Flag of frz_grains_params: grains outside the box from frz_grains_params.keep_low to keep_high are removed.
+pub const FRZ_GRAINS_BOX: u32 = 4;
+
+/// Flag of frz_grains_params: grains among others feel less of the air than those of a thin spray.
+pub const FRZ_GRAINS_AIR_BY_DENSITY: u32 = 8;
 
 fields_of!(Params <=> frz_grains_params {
     radius, compression, friction, attraction, restitution, air, gravity, seed

@@ -35,17 +35,10 @@ pub enum frz_grains_attribute {
 
 use frz_grains_attribute::*;
 
-const ATTRIBUTES: [(u32, frz_grains_attribute); 9] = [
-    (0, FRZ_GRAINS_POSITION),
-    (1, FRZ_GRAINS_POSITION_DOUBLE),
-    (2, FRZ_GRAINS_VELOCITY),
-    (3, FRZ_GRAINS_ID),
-    (4, FRZ_GRAINS_RADIUS),
-    (5, FRZ_GRAINS_SOURCE_FRAME),
-    (6, FRZ_GRAINS_REST),
-    (7, FRZ_GRAINS_ACTIVE),
-    (8, FRZ_GRAINS_TRAPPED),
-];
+const ATTRIBUTES: Meanings<frz_grains_attribute, 9> = numbered! {
+    FRZ_GRAINS_POSITION, FRZ_GRAINS_POSITION_DOUBLE, FRZ_GRAINS_VELOCITY, FRZ_GRAINS_ID, FRZ_GRAINS_RADIUS,
+    FRZ_GRAINS_SOURCE_FRAME, FRZ_GRAINS_REST, FRZ_GRAINS_ACTIVE, FRZ_GRAINS_TRAPPED
+};
 
 /// Adds loose grains: debris, drift, snow that falls from a tree. They exist at once and move with the next step; those that overlap each
 /// other or an object are pushed apart.
@@ -71,15 +64,15 @@ pub unsafe extern "C" fn frz_grains_emit(
         clear(first);
         let call = enter(context)?;
         let ctx = call.ctx();
-        let mut heap = change(grains)?;
-        let grains = &mut heap.grains;
+        let mut handle = change(grains)?;
+        let grains = &mut handle.grains;
         ctx.allow("the grains", memory(grains.count().saturating_add(positions.count)))?;
         let emitted = positions.finite("positions")?;
         let velocities = velocities.finite("velocities")?;
         let emitted: Vec<DVec3> =
             emitted.into_iter().map(|position| position.map(f64::from).into()).collect();
         let id = ctx.phase_in_place("emit", || grains.emit(&emitted, &velocities, frame))?;
-        heap.saved.take();
+        handle.saved.take();
         write_some(first, if emitted.is_empty() { -1 } else { i64::from(id) });
         Ok(())
     })
@@ -111,8 +104,8 @@ pub unsafe extern "C" fn frz_grains_read(
     // SAFETY: the grains are NULL or alive; the span is valid.
     guard(|| unsafe {
         let attribute = meaning("attribute", "frz_grains_attribute", attribute, &ATTRIBUTES)?;
-        let heap = read(grains)?;
-        let grains = &heap.grains;
+        let handle = read(grains)?;
+        let grains = &handle.grains;
         let single = |position: DVec3| <[f32; 3]>::from(position.map(|x| x as f32));
         match attribute {
             FRZ_GRAINS_POSITION => dst.collect("dst", grains.positions().map(single)),
@@ -145,5 +138,7 @@ pub unsafe extern "C" fn frz_grains_save(
     size: *mut usize,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    unsafe { saves(context, grains, (dst, capacity, size), |heap| (&heap.saved, &heap.grains), Grains::save) }
+    unsafe {
+        saves(context, grains, (dst, capacity, size), |handle| (&handle.saved, &handle.grains), Grains::save)
+    }
 }

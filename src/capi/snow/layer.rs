@@ -4,9 +4,11 @@ use crate::capi::ffi::*;
 use crate::capi::grid::sparse::{check_voxel, frz_grid};
 use crate::capi::mesh::triangles::{frz_mesh, no_flags};
 use crate::capi::runtime::context::{creates, frz_context};
+use crate::context::Context;
 use crate::geometry::TriMesh;
 use crate::snow::base_layer::initial::{Cover, Ground, layer};
 use crate::sweep::surface_bytes;
+use crate::vdb::FloatGrid;
 
 /// Description of a layer of snow: the ground and the depth.
 #[repr(C)]
@@ -36,16 +38,10 @@ pub struct frz_snow_desc {
     pub static_count: usize,
 }
 
-// SAFETY: numbers and pointers.
-unsafe impl Sized32 for frz_snow_desc {
-    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_snow_desc, statics), size_of::<Self>()];
-    const NAME: &'static str = "frz_snow_desc";
-
-    fn defaults() -> Self {
-        let area = [-1.0, -1.0, 1.0, 1.0];
-        Self { voxel_size: 0.01, half_width: 3.0, depth: 0.3, area, ..Self::zeroed() }
-    }
-}
+sized32!(frz_snow_desc, [statics], {
+    let area = [-1.0, -1.0, 1.0, 1.0];
+    Self { voxel_size: 0.01, half_width: 3.0, depth: 0.3, area, ..Self::zeroed() }
+});
 
 /// Fills a description with the defaults: voxels of 1 cm, 0.3 m of snow on a square of 2 m at y = 0.
 ///
@@ -72,32 +68,38 @@ pub unsafe extern "C" fn frz_snow_layer(
     out: *mut *mut frz_grid,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
+    unsafe { creates(context, out, |ctx| layer_of(ctx, &given(desc)?)) }
+}
+
+/// A layer of snow from its description.
+///
+/// # Safety
+/// The description must describe memory that can be read.
+unsafe fn layer_of(ctx: &Context, desc: &frz_snow_desc) -> Outcome<FloatGrid> {
+    // SAFETY: guaranteed by the caller.
     unsafe {
-        creates(context, out, |ctx| {
-            let desc = given(desc)?;
-            no_flags(desc.flags, 0)?;
-            check_voxel(desc.voxel_size)?;
-            within("half_width", desc.half_width, 3.0..=64.0, "")?;
-            finite("depth", desc.depth)?;
-            finite("ground_height", desc.ground_height)?;
-            for (at, &side) in desc.area.iter().enumerate() {
-                finite(&format!("area: element {at}"), side)?;
-            }
-            let statics = read_each(desc.statics, desc.static_count, "statics")?;
-            let statics: Vec<TriMesh> = statics.iter().map(|mesh| mesh.triangles.clone()).collect();
-            let ground = match desc.ground.is_null() {
-                true => Ground::Plane { height: desc.ground_height, area: desc.area },
-                false => Ground::Mesh(read(desc.ground)?.triangles.clone()),
-            };
-            let cover = match desc.top.is_null() {
-                true => Cover::Depth(desc.depth),
-                false => Cover::Top(read(desc.top)?.triangles.clone()),
-            };
-            let area = surfaces(&ground, &cover, &statics);
-            ctx.allow("the layer of snow", surface_bytes(area, desc.voxel_size))?;
-            let half_width = desc.half_width as f32;
-            Ok(ctx.polled(|| layer(ctx, &ground, &statics, &cover, desc.voxel_size, half_width))?)
-        })
+        no_flags(desc.flags, 0)?;
+        check_voxel(desc.voxel_size)?;
+        within("half_width", desc.half_width, 3.0..=64.0, "")?;
+        finite("depth", desc.depth)?;
+        finite("ground_height", desc.ground_height)?;
+        for (at, &side) in desc.area.iter().enumerate() {
+            finite(&format!("area: element {at}"), side)?;
+        }
+        let statics = read_each(desc.statics, desc.static_count, "statics")?;
+        let statics: Vec<TriMesh> = statics.iter().map(|mesh| mesh.triangles.clone()).collect();
+        let ground = match desc.ground.is_null() {
+            true => Ground::Plane { height: desc.ground_height, area: desc.area },
+            false => Ground::Mesh(read(desc.ground)?.triangles.clone()),
+        };
+        let cover = match desc.top.is_null() {
+            true => Cover::Depth(desc.depth),
+            false => Cover::Top(read(desc.top)?.triangles.clone()),
+        };
+        let area = surfaces(&ground, &cover, &statics);
+        ctx.allow("the layer of snow", surface_bytes(area, desc.voxel_size))?;
+        let half_width = desc.half_width as f32;
+        Ok(ctx.polled(|| layer(ctx, &ground, &statics, &cover, desc.voxel_size, half_width))?)
     }
 }
 

@@ -5,7 +5,7 @@ use std::ffi::c_void;
 use super::base_layer::frz_base;
 use super::grains::frz_grains;
 use super::mist_params::frz_mist_params;
-use crate::capi::ffi::saved::{Saved, resumed, saves};
+use crate::capi::ffi::saved::{Restart, Saved, new_or_resumed, saves};
 use crate::capi::ffi::*;
 use crate::capi::grid::sparse::{Grid, frz_grid};
 use crate::capi::level_set::body::{Role, Shapes, bodies, frz_body};
@@ -45,36 +45,29 @@ pub struct frz_mist_report {
     pub fastest: f64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_mist_report {
-    const NAME: &'static str = "frz_mist_report";
-}
+sized32!(frz_mist_report);
 
 fields_of!(StepReport => frz_mist_report { sub_steps, cells, sources, iterations, mass, divergence, fastest });
 
 /// The value of a handle of mist.
-pub(in crate::capi) struct Air {
+pub(in crate::capi) struct MistHandle {
     mist: Mist,
     floor: Option<f64>,
     shapes: Shapes,
     saved: Saved,
 }
 
-impl HandleType for frz_mist {
-    type Value = Air;
-    const NAME: &'static str = "mist handle";
-    const TAG: u32 = 0x6672_7a07;
-}
+handle!(frz_mist, MistHandle, "mist handle", 7);
 
-/// Minimum and maximum length of a step (s).
-const SHORTEST: f64 = 1.0e-6;
-/// As above.
-const LONGEST: f64 = 3600.0;
-/// Maximum distance of a time from 0 (s).
-const LATEST: f64 = 1.0e9;
+/// Minimum length of a step (s).
+const MIN_DT: f64 = 1.0e-6;
+/// Maximum length of a step (s).
+const MAX_DT: f64 = 3600.0;
+/// Maximum time (s), in absolute value.
+const MAX_TIME: f64 = 1.0e9;
 
 /// Inputs of a step besides grains.
-pub(in crate::capi) struct Scene<'a> {
+pub(in crate::capi) struct HostInputs<'a> {
     pub snow: Option<&'a FloatGrid>,
     pub wind: Option<&'a VectorGrid>,
     pub bodies: (*const frz_body, usize),
@@ -82,7 +75,29 @@ pub(in crate::capi) struct Scene<'a> {
     pub dt: f64,
 }
 
-impl Air {
+impl MistHandle {
+    /// New mist, or that of a saved state.
+    ///
+    /// # Safety
+    /// The pointers must be NULL or valid.
+    unsafe fn new(ctx: &Context, params: *const frz_mist_params, restart: Restart) -> Outcome<Self> {
+        // SAFETY: guaranteed by the caller.
+        unsafe {
+            let params = given_or_defaults(params)?;
+            let own = params.params()?;
+            let (new, resume) =
+                (|| Ok(Mist::new(own.clone())?), |state: &[u8]| Mist::resume(own.clone(), state));
+            let mist = new_or_resumed(ctx, "mist", restart, new, Mist::unpacked, resume)?;
+            Ok(Self { mist, floor: params.ground(), shapes: Shapes::new(), saved: Saved::default() })
+        }
+    }
+
+    fn set_params(&mut self, params: &frz_mist_params) -> Outcome {
+        self.mist.set_params(params.params()?)?;
+        self.floor = params.ground();
+        Ok(())
+    }
+
     /// Moves the mist through a step.
     ///
     /// # Safety
@@ -91,11 +106,11 @@ impl Air {
         &mut self,
         ctx: &Context,
         sources: &[Source],
-        scene: &Scene<'_>,
+        host: &HostInputs<'_>,
     ) -> Outcome<frz_mist_report> {
-        let Scene { snow, wind, bodies: (list, count), time, dt } = *scene;
-        within("dt", dt, SHORTEST..=LONGEST, " s")?;
-        within("time", time, -LATEST..=LATEST, " s")?;
+        let HostInputs { snow, wind, bodies: (list, count), time, dt } = *host;
+        within("dt", dt, MIN_DT..=MAX_DT, " s")?;
+        within("time", time, -MAX_TIME..=MAX_TIME, " s")?;
         // SAFETY: guaranteed by the caller.
         let bodies = unsafe { bodies(ctx, list, count, dt, Role::Bound, &mut self.shapes) }?;
         let bodies: Vec<&Body> = bodies.iter().map(|(body, _)| body).collect();
@@ -110,8 +125,8 @@ impl Air {
         };
         let wind = wind.map(|_| Wind(&sample));
         let fastest = walls.fastest_near(&self.mist, sources);
-        let around = StepInputs { sources, boundary: &boundary, fastest, wind: wind.as_ref() };
-        let done = self.mist.step(ctx, &around, [time, time + dt])?;
+        let inputs = StepInputs { sources, boundary: &boundary, fastest, wind: wind.as_ref() };
+        let done = self.mist.step(ctx, &inputs, [time, time + dt])?;
         self.saved.take();
         Ok(done.into())
     }
@@ -135,18 +150,7 @@ pub unsafe extern "C" fn frz_mist_create(
     out: *mut *mut frz_mist,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    unsafe {
-        creates(context, out, |ctx| {
-            let params = given_or_defaults(params)?;
-            let own = params.params()?;
-            let state = frz_view::packed(restart, restart_bytes).elements::<u8>("restart")?;
-            let mist = match restart.is_null() {
-                true => Mist::new(own)?,
-                false => resumed(ctx, "mist", Mist::unpacked(&state), || Mist::resume(own, &state))?,
-            };
-            Ok(Air { mist, floor: params.ground(), shapes: Shapes::new(), saved: Saved::default() })
-        })
-    }
+    unsafe { creates(context, out, |ctx| MistHandle::new(ctx, params, (restart, restart_bytes))) }
 }
 
 /// Destroys mist; NULL is ignored.
@@ -171,13 +175,7 @@ pub unsafe extern "C" fn frz_mist_set_params(
     params: *const frz_mist_params,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    guard(|| unsafe {
-        let mut air = change(mist)?;
-        let params = given(params)?;
-        air.mist.set_params(params.params()?)?;
-        air.floor = params.ground();
-        Ok(())
-    })
+    guard(|| unsafe { change(mist)?.set_params(&given(params)?) })
 }
 
 /// Moves mist through a step, and adds what fast grains raise along their paths.
@@ -216,16 +214,16 @@ pub unsafe extern "C" fn frz_mist_step(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     unsafe {
-        steps(context, mist, report, |ctx, air| {
+        steps(context, mist, report, |ctx, handle| {
             let grains = read_some(grains)?;
             let base = read_some(base)?;
             let wind = read_some(wind)?;
             let wind = wind.as_deref().map(Grid::vectors).transpose()?;
             let sources = match &grains {
-                Some(heap) => {
-                    let radius = heap.grains.params().radius;
+                Some(handle) => {
+                    let radius = handle.grains.params().radius;
                     let grains =
-                        heap.grains.positions().zip(heap.grains.velocities()).zip(heap.grains.starts());
+                        handle.grains.positions().zip(handle.grains.velocities()).zip(handle.grains.starts());
                     let start = |(position, velocity)| Start { position, velocity };
                     grains
                         .map(|((position, velocity), from)| Source {
@@ -238,14 +236,18 @@ pub unsafe extern "C" fn frz_mist_step(
                 }
                 None => Vec::new(),
             };
-            let snow = base.as_deref().map(|base| before(ctx, &base.layer)).transpose()?;
-            air.step(ctx, &sources, &Scene { snow: snow.as_ref(), wind, bodies: (bodies, count), time, dt })
+            let snow = base.as_deref().map(|base| snow_before(ctx, &base.layer)).transpose()?;
+            handle.step(
+                ctx,
+                &sources,
+                &HostInputs { snow: snow.as_ref(), wind, bodies: (bodies, count), time, dt },
+            )
         })
     }
 }
 
 /// The snow of a layer before its last step.
-fn before(ctx: &Context, layer: &BaseLayer) -> Outcome<FloatGrid> {
+fn snow_before(ctx: &Context, layer: &BaseLayer) -> Outcome<FloatGrid> {
     ctx.allow("the snow before the step", layer.surface().memory_bytes())?;
     let copy = || {
         let mut snow = layer.surface().deep_copy()?;
@@ -267,7 +269,7 @@ pub enum frz_mist_field {
 
 use frz_mist_field::*;
 
-const FIELDS: [(u32, frz_mist_field); 2] = [(0, FRZ_MIST_DENSITY), (1, FRZ_MIST_VELOCITY)];
+const FIELDS: Meanings<frz_mist_field, 2> = numbered! { FRZ_MIST_DENSITY, FRZ_MIST_VELOCITY };
 
 /// Creates a grid of the mist, whose voxels are its cells: the centre of voxel (0, 0, 0) lies at half a cell on each axis.
 ///
@@ -286,8 +288,8 @@ pub unsafe extern "C" fn frz_mist_grid(
     unsafe {
         creates(context, out, |ctx| {
             let field = meaning("field", "frz_mist_field", field, &FIELDS)?;
-            let air = read(mist)?;
-            let Grids { density, velocity } = Grids::of(ctx, &air.mist)?;
+            let handle = read(mist)?;
+            let Grids { density, velocity } = Grids::of(ctx, &handle.mist)?;
             Ok(Grid::Own(match field {
                 FRZ_MIST_DENSITY => AnyGrid::Floats(density),
                 FRZ_MIST_VELOCITY => AnyGrid::Vectors(velocity),
@@ -313,5 +315,5 @@ pub unsafe extern "C" fn frz_mist_save(
     size: *mut usize,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    unsafe { saves(context, mist, (dst, capacity, size), |air| (&air.saved, &air.mist), Mist::save) }
+    unsafe { saves(context, mist, (dst, capacity, size), |handle| (&handle.saved, &handle.mist), Mist::save) }
 }

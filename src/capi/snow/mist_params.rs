@@ -4,12 +4,6 @@ use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::snow::mist::Params;
 
-/// Flag of frz_mist_params: falling grains raise mist too.
-pub const FRZ_MIST_FALLING: u32 = 1;
-
-/// Flag of frz_mist_params: there is a level ground at frz_mist_params.floor.
-pub const FRZ_MIST_FLOOR: u32 = 2;
-
 /// How grains raise mist and how it behaves. All parameters but the cell and the wind may change between steps.
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -46,15 +40,13 @@ pub struct frz_mist_params {
     pub padding: u32,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_mist_params {
-    const NAME: &'static str = "frz_mist_params";
+sized32!(frz_mist_params, [], Params::for_cell(0.01 * 4.0 / 3.0).into());
 
-    /// For voxels of 1 cm.
-    fn defaults() -> Self {
-        Params::for_cell(0.01 * 4.0 / 3.0).into()
-    }
-}
+/// Flag of frz_mist_params: falling grains raise mist too.
+pub const FRZ_MIST_FALLING: u32 = 1;
+
+/// Flag of frz_mist_params: there is a level ground at frz_mist_params.floor.
+pub const FRZ_MIST_FLOOR: u32 = 2;
 
 fields_of!(Params <=> frz_mist_params {
     cell, from_speed, gravity, half_life, wind, turbulence, turbulence_size, confinement, noise, noise_size, seed, padding

@@ -1,7 +1,7 @@
-//! Mist that a host's points raise.
+//! Mist that a host's own points raise.
 
 use super::grains::check_snow;
-use super::mist::{Scene, frz_mist, frz_mist_report};
+use super::mist::{HostInputs, frz_mist, frz_mist_report};
 use crate::capi::ffi::*;
 use crate::capi::grid::sparse::{Grid, frz_grid};
 use crate::capi::level_set::body::frz_body;
@@ -101,10 +101,10 @@ pub unsafe extern "C" fn frz_mist_step_paths(
     }
 }
 
-/// Moves mist through a step, and adds what points raise.
+/// The body of an interface function that moves mist through a step, and adds what points raise.
 ///
 /// # Safety
-/// As the functions above.
+/// The pointers must be NULL or valid.
 unsafe fn step_along(
     context: *mut frz_context,
     mist: *mut frz_mist,
@@ -116,31 +116,33 @@ unsafe fn step_along(
 ) -> frz_status {
     // SAFETY: guaranteed by the caller.
     unsafe {
-        steps(context, mist, report, |ctx, air| {
+        steps(context, mist, report, |ctx, handle| {
             let snow = read_some(snow)?;
             let snow = snow.as_deref().map(Grid::floats).transpose()?;
             snow.map_or(Ok(()), |snow| check_snow("snow", snow))?;
             let wind = read_some(wind)?;
             let wind = wind.as_deref().map(Grid::vectors).transpose()?;
-            air.step(ctx, &raised()?, &Scene { snow, wind, bodies, time, dt })
+            handle.step(ctx, &raised()?, &HostInputs { snow, wind, bodies, time, dt })
         })
     }
 }
 
-/// Positions (m) and velocities (m/s) of points; their names appear in messages.
+/// Reads positions (m) and velocities (m/s) of points; their names are for messages.
 ///
 /// # Safety
 /// The views must describe memory that can be read.
 unsafe fn points(
-    (names, positions): (&str, frz_view),
-    (of_velocities, velocities): (&str, frz_view),
+    (position_name, positions): (&str, frz_view),
+    (velocity_name, velocities): (&str, frz_view),
 ) -> Outcome<Vec<Start>> {
     // SAFETY: guaranteed by the caller.
-    let (positions, velocities) =
-        unsafe { (positions.elements::<[f64; 3]>(names)?, velocities.elements::<[f32; 3]>(of_velocities)?) };
+    let (positions, velocities) = unsafe {
+        (positions.elements::<[f64; 3]>(position_name)?, velocities.elements::<[f32; 3]>(velocity_name)?)
+    };
     if velocities.len() != positions.len() {
         let (velocities, positions) = (velocities.len(), positions.len());
-        let text = format!("{of_velocities}: {velocities} elements, but there are {positions} {names}");
+        let text =
+            format!("{velocity_name}: {velocities} elements, but there are {positions} {position_name}");
         return Err(Failure::argument(text));
     }
     let point = |(position, velocity): (&[f64; 3], &[f32; 3])| Start {
@@ -150,7 +152,7 @@ unsafe fn points(
     Ok(positions.iter().zip(&*velocities).map(point).collect())
 }
 
-/// Points of a radius (m) after a step as sources of mist, with their positions before it.
+/// Sources of mist from points of a radius (m) at the end of a step, and, if known, at its beginning.
 fn sources(ends: &[Start], starts: Option<&[Start]>, radius: f64) -> Outcome<Vec<Source>> {
     within("radius", radius, f64::MIN_POSITIVE..=f64::MAX, " m")?;
     let source = |(index, end): (usize, &Start)| Source {

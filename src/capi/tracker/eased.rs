@@ -1,12 +1,12 @@
-//! The mesh of a tracker as it is displayed before the liquid merges or splits.
+//! The displayed positions of a tracker's mesh, eased towards coming merges and splits.
 
-use super::follower::frz_tracker;
+use super::handle::frz_tracker;
 use super::mesh::{frz_particles, particles};
 use crate::capi::ffi::*;
 use crate::capi::runtime::context::{enter, frz_context};
 
-/// Maximum number of frames ahead.
-const MOST: usize = 100;
+/// Maximum number of steps ahead.
+const MAX_AHEAD: usize = 100;
 
 /// Copies the displayed positions of the mesh's vertices. In the steps before the liquid merges or splits, vertices that will be removed
 /// already move towards the mesh that will replace them, so that the change does not pop. This needs frz_tracker_params.rebuild; without
@@ -38,22 +38,24 @@ pub unsafe extern "C" fn frz_tracker_read_eased(
     // SAFETY: the pointers are NULL or valid.
     guard(|| unsafe {
         let call = enter(context)?;
-        let mut follower = change(tracker)?;
+        let mut handle = change(tracker)?;
         call.ctx().check()?;
         finite("dt", dt)?;
         refuse(dt <= 0.0, || format!("dt = {dt} s must be positive and finite"))?;
-        refuse(ahead == 0 || ahead as usize > MOST, || format!("ahead = {ahead} is not within 1 to {MOST}"))?;
+        refuse(ahead == 0 || ahead as usize > MAX_AHEAD, || {
+            format!("ahead = {ahead} is not within 1 to {MAX_AHEAD}")
+        })?;
         refuse(count > ahead as usize, || format!("count = {count} is more than ahead, {ahead}"))?;
         refuse(coming.is_null() && count > 0, || "coming is NULL")?;
         let now = particles(now)?;
         let coming = frz_view::packed(coming, count).elements::<*const frz_particles>("coming")?;
         let coming = coming.into_iter().map(|frame| particles(frame)).collect::<Outcome<Vec<_>>>()?;
-        let follower = &mut *follower;
-        if !follower.tracker.params().rebuild {
-            return dst.put("dst", follower.tracker.vertices().iter().map(|&p| <[f64; 3]>::from(p)));
+        let handle = &mut *handle;
+        if !handle.tracker.params().rebuild {
+            return dst.put("dst", handle.tracker.vertices().iter().map(|&p| <[f64; 3]>::from(p)));
         }
-        follower.outlook.look(call.ctx(), &follower.tracker, now, coming, dt)?;
-        let positions = follower.outlook.eased(call.ctx(), &follower.tracker, ahead as usize)?;
+        handle.outlook.look(call.ctx(), &handle.tracker, now, coming, dt)?;
+        let positions = handle.outlook.eased(call.ctx(), &handle.tracker, ahead as usize)?;
         dst.put("dst", positions.iter().map(|&p| <[f64; 3]>::from(p)))
     })
 }

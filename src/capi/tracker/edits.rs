@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::follower::{TrackerHandle, frz_tracker};
+use super::handle::{TrackerHandle, frz_tracker};
 use crate::capi::ffi::*;
 use crate::geometry::DVec3;
 use crate::mesh_repair::Source;
@@ -25,12 +25,9 @@ pub enum frz_tracker_array {
 
 use frz_tracker_array::*;
 
-const ARRAYS: [(u32, frz_tracker_array); 4] = [
-    (0, FRZ_TRACKER_POSITION),
-    (1, FRZ_TRACKER_POSITION_DOUBLE),
-    (2, FRZ_TRACKER_DELTA),
-    (3, FRZ_TRACKER_FLAGGED),
-];
+const ARRAYS: Meanings<frz_tracker_array, 4> = numbered! {
+    FRZ_TRACKER_POSITION, FRZ_TRACKER_POSITION_DOUBLE, FRZ_TRACKER_DELTA, FRZ_TRACKER_FLAGGED
+};
 
 /// Reports the number of vertices of the mesh: that of the mesh that the tracker was created with, until a step
 /// (frz_tracker_params.rebuild) or frz_tracker_resculpt changes it.
@@ -59,8 +56,8 @@ pub unsafe extern "C" fn frz_tracker_read(
     // SAFETY: the tracker is NULL or alive; the span is valid.
     guard(|| unsafe {
         let array = meaning("array", "frz_tracker_array", array, &ARRAYS)?;
-        let follower = read(tracker)?;
-        let tracker = &follower.tracker;
+        let handle = read(tracker)?;
+        let tracker = &handle.tracker;
         let positions = tracker.vertices().iter();
         match array {
             FRZ_TRACKER_POSITION => dst.put("dst", positions.map(|p| <[f32; 3]>::from(p.map(|x| x as f32)))),
@@ -133,8 +130,9 @@ pub enum frz_edit_kind {
 use frz_edit_array::*;
 use frz_edit_kind::*;
 
-const EDITS: [(u32, frz_edit_array); 4] =
-    [(0, FRZ_EDIT_ORIGIN), (1, FRZ_EDIT_SOURCE), (2, FRZ_EDIT_KIND), (3, FRZ_EDIT_BEFORE)];
+const EDITS: Meanings<frz_edit_array, 4> = numbered! {
+    FRZ_EDIT_ORIGIN, FRZ_EDIT_SOURCE, FRZ_EDIT_KIND, FRZ_EDIT_BEFORE
+};
 
 /// Reports whether the last step, or frz_tracker_resculpt since, changed the mesh's vertices and triangles. 0 for a tracker that was just
 /// created or restored.
@@ -153,9 +151,9 @@ pub unsafe extern "C" fn frz_tracker_edits(
     guard(|| unsafe {
         clear(before);
         answer(changed, "changed", || {
-            let follower = read(tracker)?;
-            write_some(before, follower.before().len());
-            Ok(u32::from(follower.edits.is_some()))
+            let handle = read(tracker)?;
+            write_some(before, handle.before().len());
+            Ok(u32::from(handle.edits.is_some()))
         })
     })
 }
@@ -176,15 +174,15 @@ pub unsafe extern "C" fn frz_tracker_read_edits(
     // SAFETY: the tracker is NULL or alive; the span is valid.
     guard(|| unsafe {
         let array = meaning("array", "frz_edit_array", array, &EDITS)?;
-        let follower = read(tracker)?;
+        let handle = read(tracker)?;
         match array {
-            FRZ_EDIT_ORIGIN => dst.fill("dst", &follower.origins()),
+            FRZ_EDIT_ORIGIN => dst.fill("dst", &handle.origins()),
             FRZ_EDIT_SOURCE => {
                 let source = |source: &Source| match *source {
                     Source::Whole(triangle) | Source::Part(triangle) => i64::from(triangle),
                     Source::New => -1,
                 };
-                dst.put("dst", follower.sources().iter().map(source))
+                dst.put("dst", handle.sources().iter().map(source))
             }
             FRZ_EDIT_KIND => {
                 let kind = |source: &Source| match source {
@@ -192,9 +190,9 @@ pub unsafe extern "C" fn frz_tracker_read_edits(
                     Source::Part(_) => FRZ_EDIT_PART as u32,
                     Source::New => FRZ_EDIT_NEW as u32,
                 };
-                dst.put("dst", follower.sources().iter().map(kind))
+                dst.put("dst", handle.sources().iter().map(kind))
             }
-            FRZ_EDIT_BEFORE => dst.put("dst", follower.before().iter().map(|&p| <[f64; 3]>::from(p))),
+            FRZ_EDIT_BEFORE => dst.put("dst", handle.before().iter().map(|&p| <[f64; 3]>::from(p))),
         }
     })
 }

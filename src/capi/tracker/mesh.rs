@@ -1,17 +1,18 @@
-//! A detailed mesh that follows the particles of a liquid.
+//! Trackers: detailed meshes that follow the particles of a liquid.
 
 use std::ffi::c_void;
 
-use super::follower::{TrackerHandle, frz_tracker};
+use super::handle::{TrackerHandle, frz_tracker};
 pub use super::params::{frz_tracker_params, frz_tracker_params_init};
-use crate::capi::ffi::saved::{Saved, resumed, saves};
+use crate::capi::ffi::saved::{Restart, new_or_resumed, saves};
 use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::{frz_mesh, no_flags};
 use crate::capi::runtime::context::{creates, enter, frz_context, steps};
-use crate::capi::tracker::follower::Edits;
+use crate::capi::tracker::handle::Edits;
+use crate::context::Context;
 use crate::geometry::check::orientation::{Closing, Orientation};
 use crate::geometry::check::topology::Topology;
-use crate::surface::{Change, Outlook, Particles, StepReport, Tracker, estimate_spacing};
+use crate::surface::{Change, Outlook, Params, Particles, StepReport, Tracker, estimate_spacing};
 
 /// The particles of a liquid at one time. Their order does not matter.
 #[repr(C)]
@@ -29,10 +30,7 @@ pub struct frz_particles {
     pub ids: frz_view,
 }
 
-// SAFETY: numbers and pointers.
-unsafe impl Sized32 for frz_particles {
-    const NAME: &'static str = "frz_particles";
-}
+sized32!(frz_particles);
 
 /// What a step did.
 #[repr(C)]
@@ -73,23 +71,14 @@ pub struct frz_tracker_report {
     pub specks: u64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_tracker_report {
-    const SIZES: &'static [usize] = &[
-        std::mem::offset_of!(frz_tracker_report, uncovered),
-        std::mem::offset_of!(frz_tracker_report, changed),
-        std::mem::offset_of!(frz_tracker_report, specks),
-        size_of::<Self>(),
-    ];
-    const NAME: &'static str = "frz_tracker_report";
-}
+sized32!(frz_tracker_report, [uncovered, changed, specks]);
 
 fields_of!(StepReport => frz_tracker_report { parts, jumped, lost, born, died, triangles, uncovered });
 
 /// Refuses to rebuild a restored mesh that is not closed, as [`Tracker::new`] does at the first frame.
 fn check_closed(tracker: &Tracker) -> Outcome {
     let triangles = tracker.triangles();
-    // Nothing is left if all of the liquid has gone.
+    // The mesh is empty once all of the liquid is gone.
     if triangles.is_empty() || Topology::of(tracker.vertices().len(), triangles).is_watertight() {
         return Ok(());
     }
@@ -102,7 +91,7 @@ fn check_closed(tracker: &Tracker) -> Outcome {
 /// The pointer must be NULL or valid, and its views must describe memory that can be read.
 pub(in crate::capi) unsafe fn particles(pointer: *const frz_particles) -> Outcome<Particles> {
     // SAFETY: guaranteed by the caller.
-    let (places, velocities, ids) = unsafe {
+    let (positions, velocities, ids) = unsafe {
         let given = given(pointer)?;
         no_flags(given.flags, 0)?;
         (
@@ -111,9 +100,86 @@ pub(in crate::capi) unsafe fn particles(pointer: *const frz_particles) -> Outcom
             given.ids.elements::<i64>("ids")?,
         )
     };
-    let particles = Particles { positions: places.into_iter().map(Into::into).collect(), velocities, ids };
+    let particles = Particles { positions: positions.into_iter().map(Into::into).collect(), velocities, ids };
     particles.validate()?;
     Ok(particles)
+}
+
+impl TrackerHandle {
+    /// A tracker at the first frame, or in a saved state.
+    ///
+    /// # Safety
+    /// The pointers must be NULL or valid.
+    unsafe fn new(
+        ctx: &Context,
+        params: Params,
+        mesh: *const frz_mesh,
+        particles: *const frz_particles,
+        restart: Restart,
+    ) -> Outcome<Self> {
+        // SAFETY: guaranteed by the caller.
+        let mesh = unsafe { read(mesh) }?;
+        let triangles = &mesh.triangles;
+        let new = || {
+            // SAFETY: as above.
+            let particles = unsafe { self::particles(particles) }?;
+            if params.rebuild && !Orientation::of_mesh(triangles, Closing::Caps).is_unchanged() {
+                ctx.warn("the mesh: parts of it are inside out: reverse their faces");
+            }
+            Ok(Tracker::new(ctx, params, triangles, &particles)?)
+        };
+        let resume = |state: &[u8]| Tracker::resume(params, triangles, state);
+        // SAFETY: as above.
+        let mut tracker =
+            unsafe { new_or_resumed(ctx, "a tracker", restart, new, Tracker::unpacked, resume) }?;
+        if params.rebuild && !restart.0.is_null() {
+            check_closed(&tracker)?;
+        }
+        // The state of a rebuilt mesh contains the mesh.
+        if !tracker.is_rebuilt() {
+            tracker.set_detail_retention(mesh.attribute("detail", 1).unwrap_or_default().to_vec())?;
+        }
+        let (outlook, saved) = Default::default();
+        Ok(Self { tracker, edits: None, outlook, saved, has_warned: false })
+    }
+
+    /// Moves the mesh through a step of `dt` seconds.
+    fn step(
+        &mut self,
+        ctx: &Context,
+        from: &Particles,
+        to: &Particles,
+        dt: f64,
+    ) -> Outcome<frz_tracker_report> {
+        // Taking a step that was computed in advance does not check for a cancel.
+        ctx.check()?;
+        let mut done = match self.outlook.take(from, to, dt) {
+            Some((tracker, done)) => {
+                self.tracker = tracker;
+                done
+            }
+            None => self.tracker.step(ctx, from, to, dt)?,
+        };
+        self.saved.take();
+        done.new_warnings(&mut self.has_warned).for_each(|warning| ctx.warn(warning));
+        let drops = done.uncovered_parts.iter().filter(|part| part.volume >= 0.0).count();
+        let bubbles = done.uncovered_parts.len() - drops;
+        let change = done.change.take();
+        let of_change = |count: fn(&Change) -> usize| change.as_ref().map_or(0, count) as u64;
+        let report = frz_tracker_report {
+            drops: drops as u64,
+            bubbles: bubbles as u64,
+            changed: u32::from(change.is_some()),
+            rung: of_change(|change| change.rebuild_level) as u32,
+            changed_cells: of_change(|change| change.flagged_cells),
+            rebuilt_cells: of_change(|change| change.rebuilt_cells),
+            made_triangles: of_change(Change::made_triangles),
+            specks: of_change(|change| change.specks),
+            ..done.into()
+        };
+        self.edits = change.map(Edits::from);
+        Ok(report)
+    }
 }
 
 /// Estimates the initial distance between particles: from the median of the mean distances to the six nearest particles.
@@ -164,37 +230,9 @@ pub unsafe extern "C" fn frz_tracker_create(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     unsafe {
+        let restart = (restart, restart_bytes);
         creates(context, out, |ctx| {
-            let params = given(params)?.params()?;
-            let mesh = read(mesh)?;
-            let triangles = &mesh.triangles;
-            let state = frz_view::packed(restart, restart_bytes).elements::<u8>("restart")?;
-            let mut tracker = match restart.is_null() {
-                true => {
-                    let particles = self::particles(particles)?;
-                    if params.rebuild && !Orientation::of_mesh(triangles, Closing::Caps).is_unchanged() {
-                        ctx.warn("the mesh: parts of it are inside out: reverse their faces");
-                    }
-                    Tracker::new(ctx, params, triangles, &particles)?
-                }
-                false => resumed(ctx, "a tracker", Tracker::unpacked(&state), || {
-                    Tracker::resume(params, triangles, &state)
-                })?,
-            };
-            if params.rebuild && !restart.is_null() {
-                check_closed(&tracker)?;
-            }
-            // The state of a rebuilt mesh contains the mesh.
-            if !tracker.is_rebuilt() {
-                tracker.set_detail_retention(mesh.attribute("detail", 1).unwrap_or_default().to_vec())?;
-            }
-            Ok(TrackerHandle {
-                tracker,
-                edits: None,
-                outlook: Outlook::default(),
-                saved: Saved::default(),
-                has_warned: false,
-            })
+            TrackerHandle::new(ctx, given(params)?.params()?, mesh, particles, restart)
         })
     }
 }
@@ -222,9 +260,9 @@ pub unsafe extern "C" fn frz_tracker_set_params(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     guard(|| unsafe {
-        let mut follower = change(tracker)?;
-        follower.tracker.set_params(given(params)?.params()?)?;
-        follower.outlook = Outlook::default();
+        let mut handle = change(tracker)?;
+        handle.tracker.set_params(given(params)?.params()?)?;
+        handle.outlook = Outlook::default();
         Ok(())
     })
 }
@@ -243,9 +281,9 @@ pub unsafe extern "C" fn frz_tracker_ahead(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     guard(|| unsafe {
-        let mut follower = change(tracker)?;
+        let mut handle = change(tracker)?;
         let particles = self::particles(particles)?;
-        follower.tracker.prefetch(std::sync::Arc::new(particles));
+        handle.tracker.prefetch(std::sync::Arc::new(particles));
         Ok(())
     })
 }
@@ -274,37 +312,9 @@ pub unsafe extern "C" fn frz_tracker_step(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     unsafe {
-        steps(context, tracker, report, |ctx, follower| {
+        steps(context, tracker, report, |ctx, handle| {
             finite("dt", dt)?;
-            let (from, to) = (particles(from)?, particles(to)?);
-            // Taking a step that was computed in advance does not check for a cancel.
-            ctx.check()?;
-            let mut done = match follower.outlook.take(&from, &to, dt) {
-                Some((tracker, done)) => {
-                    follower.tracker = tracker;
-                    done
-                }
-                None => follower.tracker.step(ctx, &from, &to, dt)?,
-            };
-            follower.saved.take();
-            done.new_warnings(&mut follower.has_warned).for_each(|warning| ctx.warn(warning));
-            let drops = done.uncovered_parts.iter().filter(|part| part.volume >= 0.0).count();
-            let bubbles = done.uncovered_parts.len() - drops;
-            let change = done.change.take();
-            let of_change = |count: fn(&Change) -> usize| change.as_ref().map_or(0, count) as u64;
-            let report = frz_tracker_report {
-                drops: drops as u64,
-                bubbles: bubbles as u64,
-                changed: u32::from(change.is_some()),
-                rung: of_change(|change| change.rebuild_level) as u32,
-                changed_cells: of_change(|change| change.flagged_cells),
-                rebuilt_cells: of_change(|change| change.rebuilt_cells),
-                made_triangles: of_change(Change::made_triangles),
-                specks: of_change(|change| change.specks),
-                ..done.into()
-            };
-            follower.edits = change.map(Edits::from);
-            Ok(report)
+            handle.step(ctx, &particles(from)?, &particles(to)?, dt)
         })
     }
 }

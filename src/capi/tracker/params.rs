@@ -77,21 +77,11 @@ pub struct frz_tracker_params {
     pub reserved3: u32,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_tracker_params {
-    const SIZES: &'static [usize] = &[
-        std::mem::offset_of!(frz_tracker_params, rebuild),
-        std::mem::offset_of!(frz_tracker_params, min_drop),
-        size_of::<Self>(),
-    ];
-    const NAME: &'static str = "frz_tracker_params";
-
-    fn defaults() -> Self {
-        let (weighting, r#match) = (FRZ_TRACKER_AFFINE as u32, FRZ_TRACKER_MATCH_FLAGGED as u32);
-        let params = Params::for_spacing(0.0);
-        Self { weighting, r#match, rebuild: u32::from(params.rebuild), ..params.into() }
-    }
-}
+sized32!(frz_tracker_params, [rebuild, min_drop], {
+    let (weighting, r#match) = (FRZ_TRACKER_AFFINE as u32, FRZ_TRACKER_MATCH_FLAGGED as u32);
+    let params = Params::for_spacing(0.0);
+    Self { weighting, r#match, rebuild: u32::from(params.rebuild), ..params.into() }
+});
 
 fields_of!(Params <=> frz_tracker_params { spacing, cell, change, half_life, fade, min_drop });
 

@@ -1,6 +1,6 @@
-//! Where the liquid at the vertices of a tracker's mesh was at the first frame.
+//! Positions that the liquid at the vertices of a tracker's mesh had at the first frame.
 
-use super::follower::frz_tracker;
+use super::handle::frz_tracker;
 use super::mesh::{frz_particles, particles};
 use crate::capi::ffi::*;
 use crate::capi::runtime::context::{enter, frz_context};
@@ -28,14 +28,14 @@ pub unsafe extern "C" fn frz_tracker_read_rest(
     // SAFETY: the pointers are NULL or valid; the span is valid.
     guard(|| unsafe {
         let call = enter(context)?;
-        let follower = read(tracker)?;
+        let handle = read(tracker)?;
         let (first, now) = (particles(first)?, particles(now)?);
-        let nameless = |which: &str| Failure::argument(format!("{which}: the particles have no ids"));
-        let rest = Rest::of(&first).ok_or_else(|| nameless("first"))?;
+        let without_ids = |which: &str| Failure::argument(format!("{which}: the particles have no ids"));
+        let rest = Rest::of(&first).ok_or_else(|| without_ids("first"))?;
         if now.ids.is_empty() {
-            return Err(nameless("now"));
+            return Err(without_ids("now"));
         }
-        let positions = follower.tracker.rest(call.ctx(), &rest, &now)?;
+        let positions = handle.tracker.rest(call.ctx(), &rest, &now)?;
         dst.put("dst", positions.iter().map(|position| position.map_or([f64::NAN; 3], |p| p.into())))
     })
 }

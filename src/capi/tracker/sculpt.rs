@@ -1,6 +1,6 @@
 //! Replacing a tracker's mesh by one that was edited by hand.
 
-use super::follower::{Edits, frz_tracker};
+use super::handle::{Edits, frz_tracker};
 use super::mesh::{frz_particles, particles};
 use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::frz_mesh;
@@ -30,21 +30,21 @@ pub unsafe extern "C" fn frz_tracker_resculpt(
     // SAFETY: the pointers are NULL or valid.
     guard(|| unsafe {
         let call = enter(context)?;
-        let mut follower = change(tracker)?;
+        let mut handle = change(tracker)?;
         let mesh = read(mesh)?;
         let particles = self::particles(particles)?;
         let detail_retention = mesh.attribute("detail", 1).unwrap_or_default().to_vec();
-        let before = follower.tracker.vertices().to_vec();
-        let follower = &mut *follower;
-        follower.tracker.resculpt(call.ctx(), &mesh.triangles, detail_retention, &particles)?;
-        let now = &follower.tracker;
-        follower.edits = Some(Edits {
+        let before = handle.tracker.vertices().to_vec();
+        let handle = &mut *handle;
+        handle.tracker.resculpt(call.ctx(), &mesh.triangles, detail_retention, &particles)?;
+        let now = &handle.tracker;
+        handle.edits = Some(Edits {
             origins: vec![None; now.vertices().len()],
             sources: vec![Source::New; now.triangles().len()],
             before,
         });
-        follower.outlook = Outlook::default();
-        follower.saved.take();
+        handle.outlook = Outlook::default();
+        handle.saved.take();
         Ok(())
     })
 }

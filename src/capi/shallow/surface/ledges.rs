@@ -1,12 +1,12 @@
 //! Ledges of shallow liquid: where its surface ends over nothing, and comes down to the ground's edge.
 
 use super::frz_shallow_size;
-use super::prepared::Ledged;
+use super::prepared::FoundLedges;
 use crate::capi::ffi::*;
 use crate::capi::runtime::context::frz_context;
 use crate::capi::shallow::calls::changes;
 use crate::capi::shallow::ground::Terrain;
-use crate::capi::shallow::spill::{ShallowHandle, frz_shallow};
+use crate::capi::shallow::handle::{ShallowHandle, frz_shallow};
 
 /// Finds the ledges, where the ground ends over nothing, as at the edges of shelves and of holes, for surfaces with FRZ_SHALLOW_SKIRTED.
 /// With the mesh that the liquid was created with, the edge is located between the centres of cells; on other ground the surface extends by
@@ -25,12 +25,16 @@ pub unsafe extern "C" fn frz_shallow_find_ledges(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     unsafe {
-        changes(context, shallow, size, |_, spill| {
-            let ShallowHandle { shallow, around, ledged: Ledged { ledges, silhouette, is_current }, .. } =
-                spill;
+        changes(context, shallow, size, |_, liquid| {
+            let ShallowHandle {
+                shallow,
+                surroundings,
+                found_ledges: FoundLedges { ledges, silhouette, is_current },
+                ..
+            } = liquid;
             let columns = shallow.columns();
             *is_current = false;
-            match &around.terrain {
+            match &surroundings.terrain {
                 Terrain::Mesh(mesh) => silhouette.fit(ledges, columns, &mesh.positions, &mesh.triangles)?,
                 _ => ledges.find(columns),
             }

@@ -1,11 +1,11 @@
 //! Minimum heights of shallow liquid: how far its films are raised so that the ground's mesh does not show through them.
 
-use super::prepared::Lifted;
+use super::prepared::FoundHeights;
 use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::capi::runtime::context::{enter_light, frz_context};
 use crate::capi::shallow::ground::{Terrain, cells_in};
-use crate::capi::shallow::spill::{ShallowHandle, frz_shallow};
+use crate::capi::shallow::handle::{ShallowHandle, frz_shallow};
 use crate::shallow::surface::heights::minimum_heights::{Distance, Fitted};
 
 /// Distances between a thin film and the ground's mesh, in edges of a cell, each finite and 0 or more.
@@ -24,14 +24,7 @@ pub struct frz_shallow_distance {
     pub rim: f64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_shallow_distance {
-    const NAME: &'static str = "frz_shallow_distance";
-
-    fn defaults() -> Self {
-        Distance::default().into()
-    }
-}
+sized32!(frz_shallow_distance, [], Distance::default().into());
 
 fields_of!(Distance <=> frz_shallow_distance { least, margin, rim });
 
@@ -51,10 +44,7 @@ pub struct frz_shallow_fitted {
     pub capped: u64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_shallow_fitted {
-    const NAME: &'static str = "frz_shallow_fitted";
-}
+sized32!(frz_shallow_fitted);
 
 fields_of!(Fitted => frz_shallow_fitted { upward, discarded, capped });
 
@@ -82,21 +72,25 @@ pub unsafe extern "C" fn frz_shallow_find_lifts(
             let distance = given_or_defaults(distance)?;
             no_flags(distance.flags, 0)?;
             let _call = enter_light(context)?;
-            let ShallowHandle { shallow, around, lifted: Lifted { lifts, is_current }, .. } =
-                &mut *change(shallow)?;
+            let ShallowHandle {
+                shallow,
+                surroundings,
+                found_heights: FoundHeights { heights, is_current },
+                ..
+            } = &mut *change(shallow)?;
             let cells = cells_in(&shallow.columns().grid, bounds)?;
-            let Terrain::Mesh(mesh) = &around.terrain else {
+            let Terrain::Mesh(mesh) = &surroundings.terrain else {
                 return Err(Failure::argument(
                     "the liquid was not made with a mesh: it needs no minimum heights",
                 ));
             };
             let (columns, distance) = (shallow.columns(), distance.over(Distance::default()));
             let (positions, triangles) = (&mesh.positions, &mesh.triangles);
-            let found = if lifts.least().is_empty() {
-                lifts.reserve(columns.strips().len(), positions.len());
-                lifts.find(columns, positions, triangles, distance)?
+            let found = if heights.least().is_empty() {
+                heights.reserve(columns.strips().len(), positions.len());
+                heights.find(columns, positions, triangles, distance)?
             } else {
-                lifts.update(columns, positions, triangles, distance, cells)?
+                heights.update(columns, positions, triangles, distance, cells)?
             };
             *is_current = true;
             Ok(found)

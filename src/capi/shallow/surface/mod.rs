@@ -4,9 +4,9 @@ pub mod ledges;
 pub mod minimum_heights;
 pub(in crate::capi) mod prepared;
 
-use self::prepared::{Needs, wanted_lifts};
+use self::prepared::{NeededFields, requested_heights};
 use super::calls::informs;
-use super::spill::{ShallowHandle, frz_shallow};
+use super::handle::{ShallowHandle, frz_shallow};
 use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::capi::runtime::context::{enter_light, frz_context};
@@ -50,16 +50,7 @@ pub struct frz_shallow_layout {
     pub fade_depth: f64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_shallow_layout {
-    const SIZES: &'static [usize] =
-        &[std::mem::offset_of!(frz_shallow_layout, fade_depth), size_of::<Self>()];
-    const NAME: &'static str = "frz_shallow_layout";
-
-    fn defaults() -> Self {
-        Layout::default().into()
-    }
-}
+sized32!(frz_shallow_layout, [fade_depth], Layout::default().into());
 
 fields_of!(Layout <=> frz_shallow_layout { scale, least_depth, opaque_depth, fade_depth });
 
@@ -109,11 +100,7 @@ pub struct frz_shallow_target {
     pub scalars: [frz_span; 4],
 }
 
-// SAFETY: numbers and pointers.
-unsafe impl Sized32 for frz_shallow_target {
-    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_shallow_target, scalars), size_of::<Self>()];
-    const NAME: &'static str = "frz_shallow_target";
-}
+sized32!(frz_shallow_target, [scalars]);
 
 /// A buffer: its name, the bytes of an element, and whether there is one for each vertex.
 pub(in crate::capi) type Buffer<'a> = (&'static str, &'a frz_span, usize, bool);
@@ -229,24 +216,19 @@ pub struct frz_shallow_size {
     pub indices: u64,
 }
 
-// SAFETY: numbers.
-unsafe impl Sized32 for frz_shallow_size {
-    const NAME: &'static str = "frz_shallow_size";
-}
+sized32!(frz_shallow_size);
 
 fields_of!(Counts => frz_shallow_size { vertices, indices });
 
-/// What a mesh is made from, and the host's buffers that it is written to.
-pub(in crate::capi) struct Wanted<T> {
-    /// How it is written.
+/// A host's request for a mesh: how it is written, and into which buffers.
+pub(in crate::capi) struct MeshRequest<T> {
     pub(in crate::capi) layout: Layout,
     flags: u32,
     pub(in crate::capi) given: T,
     size: *mut frz_shallow_size,
 }
 
-/// An interface function that writes a mesh of an object in real time: `write` receives the layout, the buffers and the size that are
-/// `wanted`.
+/// The body of an interface function that writes a mesh of an object, in real time, as the host requests it.
 ///
 /// # Safety
 /// The pointers must be NULL or valid, and so must be the spans.
@@ -254,21 +236,19 @@ pub(in crate::capi) unsafe fn writes<N: HandleType, T: Sized32>(
     context: *mut frz_context,
     object: *mut N,
     (layout, target, size): (*const frz_shallow_layout, *const T, *mut frz_shallow_size),
-    write: impl FnOnce(&mut N::Value, &Wanted<T>) -> Outcome,
+    write: impl FnOnce(&mut N::Value, &MeshRequest<T>) -> Outcome,
 ) -> frz_status {
     // SAFETY: guaranteed by the caller.
     guard(|| unsafe {
-        let wanted = Wanted::new(layout, target, size)?;
+        let request = MeshRequest::new(layout, target, size)?;
         let _call = enter_light(context)?;
-        write(&mut *change(object)?, &wanted)
+        write(&mut *change(object)?, &request)
     })
 }
 
-impl<T: Sized32> Wanted<T> {
-    /// The request of a host.
-    ///
+impl<T: Sized32> MeshRequest<T> {
     /// # Safety
-    /// The pointers must be NULL or valid.
+    /// The pointers must be NULL or valid, and so must be the spans, as long as the request exists.
     unsafe fn new(
         layout: *const frz_shallow_layout,
         target: *const T,
@@ -290,54 +270,42 @@ impl<T: Sized32> Wanted<T> {
         self.flags & flag != 0
     }
 
-    /// Writes the size of the mesh, unless the host does not want to know.
-    ///
-    /// # Safety
-    /// The pointers must still be NULL or valid.
-    pub(in crate::capi) unsafe fn tell(&self, counts: Counts) -> Outcome {
-        // SAFETY: guaranteed by the caller.
+    /// Writes the size of the mesh, unless the host passed NULL for it.
+    pub(in crate::capi) fn report_size(&self, counts: Counts) -> Outcome {
+        // SAFETY: guaranteed by the caller of `new`.
         if self.size.is_null() { Ok(()) } else { unsafe { fill(self.size, None, counts.into()) } }
     }
 }
 
-impl Wanted<frz_shallow_target> {
-    /// What the surface shows of the flow.
-    pub(in crate::capi) fn needs(&self) -> Needs {
+impl MeshRequest<frz_shallow_target> {
+    /// The fields of the flow that have a buffer.
+    pub(in crate::capi) fn needed_fields(&self) -> NeededFields {
         let is_given = |span: &frz_span| !span.data.is_null();
-        Needs {
+        NeededFields {
             velocities: is_given(&self.given.velocities),
             scalars: self.given.scalars.each_ref().map(is_given),
         }
     }
 
     /// Writes the surface and its size.
-    ///
-    /// # Safety
-    /// As in [`Wanted::new`], and the spans must describe memory that can be written.
-    pub(in crate::capi) unsafe fn write(
+    pub(in crate::capi) fn write(
         &self,
         surface: &mut Surface,
         columns: &Columns,
         depths: &Depths<'_>,
     ) -> Outcome {
-        // SAFETY: guaranteed by the caller.
-        unsafe {
-            self.write_with(|target| match target {
-                Some(target) => surface.build(columns, depths, &self.layout, target),
-                None => surface.count(columns, depths),
-            })
-        }
+        self.write_with(|target| match target {
+            Some(target) => surface.build(columns, depths, &self.layout, target),
+            None => surface.count(columns, depths),
+        })
     }
 
     /// Writes a surface and its size; `make` builds it, or only counts it if there is no target.
-    ///
-    /// # Safety
-    /// As [`Wanted::write`].
-    pub(in crate::capi) unsafe fn write_with(
+    pub(in crate::capi) fn write_with(
         &self,
         mut make: impl FnMut(Option<&mut Target<'_>>) -> crate::Result<Counts>,
     ) -> Outcome {
-        // SAFETY: guaranteed by the caller.
+        // SAFETY: guaranteed by the caller of `new`.
         let mut target = unsafe { self.given.target() }?;
         // Too small a buffer is detected afterwards, so that a surface that fits is traversed once.
         let (counts, fits) = match make(Some(&mut target)) {
@@ -350,8 +318,7 @@ impl Wanted<frz_shallow_target> {
                 }
             }
         };
-        // SAFETY: guaranteed by the caller.
-        unsafe { self.tell(counts) }?;
+        self.report_size(counts)?;
         fits
     }
 }
@@ -404,13 +371,17 @@ pub unsafe extern "C" fn frz_shallow_surface(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so are the spans.
     unsafe {
-        writes(context, shallow, (layout, target, size), |spill, wanted| {
-            let ShallowHandle { shallow, surface, shown, lifted, ledged, .. } = spill;
-            let since = "since the ground or a body moved";
-            let (least, sunk) = wanted_lifts(wanted.has(FRZ_SHALLOW_LIFTED), lifted.known(), since)?;
-            let ledges = ledged.wanted(wanted.has(FRZ_SHALLOW_SKIRTED), since)?;
-            let depths = Depths { least, sunk, ledges, ..shown.depths(shallow, &wanted.needs())? };
-            wanted.write(surface, shallow.columns(), &depths)
-        })
+        writes(context, shallow, (layout, target, size), |liquid, request| liquid.write_surface(request))
+    }
+}
+
+impl ShallowHandle {
+    fn write_surface(&mut self, request: &MeshRequest<frz_shallow_target>) -> Outcome {
+        let Self { shallow, surface, flow_fields, found_heights, found_ledges, .. } = self;
+        let since = "since the ground or a body moved";
+        let (least, sunk) = requested_heights(request.has(FRZ_SHALLOW_LIFTED), found_heights.known(), since)?;
+        let ledges = found_ledges.requested(request.has(FRZ_SHALLOW_SKIRTED), since)?;
+        let depths = Depths { least, sunk, ledges, ..flow_fields.depths(shallow, &request.needed_fields())? };
+        request.write(surface, shallow.columns(), &depths)
     }
 }

@@ -1,6 +1,6 @@
-//! A liquid, as its handle holds it.
+//! The handle of a shallow liquid.
 
-use super::surface::prepared::{Ledged, Lifted, Shown};
+use super::surface::prepared::{FlowFields, FoundHeights, FoundLedges};
 use super::surroundings::{Setup, Surroundings};
 use crate::capi::ffi::*;
 use crate::context::Context;
@@ -27,34 +27,26 @@ pub struct frz_shallow {
     _opaque: [u8; 0],
 }
 
-impl HandleType for frz_shallow {
-    type Value = ShallowHandle;
-    const NAME: &'static str = "shallow liquid";
-    const TAG: u32 = 0x6672_7a09;
-}
+handle!(frz_shallow, ShallowHandle, "shallow liquid", 9);
 
 /// The value of a liquid's handle.
 pub(in crate::capi) struct ShallowHandle {
-    /// The liquid.
     pub shallow: Shallow,
-    /// What it flows over, and what is set in it.
-    pub around: Surroundings,
-    /// Builds surfaces.
+    pub surroundings: Surroundings,
+    /// Builds surfaces of this liquid.
     pub surface: Surface,
-    /// Minimum heights, once found.
-    pub lifted: Lifted,
-    /// Ledges, once found.
-    pub ledged: Ledged,
-    /// What surfaces show of the flow.
-    pub shown: Shown,
+    pub found_heights: FoundHeights,
+    pub found_ledges: FoundLedges,
+    /// Velocities and concentrations for surfaces.
+    pub flow_fields: FlowFields,
     /// Builds and holds meshes of the liquid in the air.
     pub balls: Balls,
     /// Drops of the last such mesh.
     pub drops: Vec<Droplet>,
-    /// Velocities of the bodies (m/s), and their loads, as last requested.
+    /// Velocities of the bodies (m/s) and their loads, of the last frz_shallow_loads.
     pub velocities_of_bodies: Vec<[f64; 3]>,
     pub loads: Vec<Load>,
-    /// Steps of a replay (s).
+    /// Lengths of the steps of a replay (s).
     pub steps: Vec<f64>,
 }
 
@@ -64,29 +56,29 @@ impl ShallowHandle {
         let shallow = ctx.phase("columns", || Shallow::new(ctx, &setup.solids, setup.params))?;
         let mut surface = Surface::default();
         surface.reserve(shallow.columns());
-        let most = shallow.params().falls.map_or(0, |falls| falls.max_packets);
+        let max_packets = shallow.params().falls.map_or(0, |falls| falls.max_packets);
         let mut balls = Balls::default();
-        balls.reserve(most);
+        balls.reserve(max_packets);
         Ok(Self {
             shallow,
-            around: Surroundings::new(setup.terrain),
+            surroundings: Surroundings::new(setup.terrain),
             surface,
-            lifted: Lifted::default(),
-            ledged: Ledged::default(),
-            shown: Shown::default(),
+            found_heights: FoundHeights::default(),
+            found_ledges: FoundLedges::default(),
+            flow_fields: FlowFields::default(),
             balls,
-            drops: Vec::with_capacity(most),
+            drops: Vec::with_capacity(max_packets),
             velocities_of_bodies: Vec::new(),
             loads: Vec::new(),
             steps: Vec::with_capacity(1024),
         })
     }
 
-    /// After a change of the ground: minimum heights and ledges must be found again where it has moved.
-    pub fn after(&mut self, moved: Moved) -> Moved {
+    /// Marks minimum heights and ledges as outdated if the ground has moved.
+    pub fn ground_changed(&mut self, moved: Moved) -> Moved {
         if moved.cells > 0 {
-            self.lifted.is_current = false;
-            self.ledged.is_current = false;
+            self.found_heights.is_current = false;
+            self.found_ledges.is_current = false;
         }
         moved
     }

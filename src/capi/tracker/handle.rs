@@ -1,4 +1,4 @@
-//! A tracker, as its handle holds it.
+//! The handle of a tracker.
 
 use crate::capi::ffi::saved::Saved;
 use crate::capi::ffi::*;
@@ -11,11 +11,7 @@ pub struct frz_tracker {
     _opaque: [u8; 0],
 }
 
-impl HandleType for frz_tracker {
-    type Value = TrackerHandle;
-    const NAME: &'static str = "tracker";
-    const TAG: u32 = 0x6672_7a08;
-}
+handle!(frz_tracker, TrackerHandle, "tracker", 8);
 
 /// How a step changed the mesh.
 pub(in crate::capi) struct Edits {
@@ -36,13 +32,12 @@ impl From<Change> for Edits {
 
 /// The value of a tracker's handle.
 pub(in crate::capi) struct TrackerHandle {
-    /// The mesh.
     pub tracker: Tracker,
-    /// How the last step changed it; `None`: no triangle changed, or there was no step yet.
+    /// How the last step changed the mesh; `None`: no triangle changed, or there was no step yet.
     pub edits: Option<Edits>,
     /// Steps computed in advance.
     pub outlook: Outlook,
     pub saved: Saved,
-    /// Whether a warning about the particles was logged.
+    /// Whether a warning about contradictory ids and velocities was logged.
     pub has_warned: bool,
 }
