@@ -737,8 +737,8 @@ enum frz_shallow_pace
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * Steps of at most frz_shallow_params.longest_step: where liquid is too deep for that its waves slow down, and films on slopes that
-     * are too fast are slowed down.
+     * Steps of at most frz_shallow_params.longest_step: waves in liquid that is too deep for such a step are slowed down, and so are films
+     * on slopes that are too fast for it.
      */
     FRZ_SHALLOW_REALTIME = 0,
     /**
@@ -1018,7 +1018,7 @@ typedef struct frz_base frz_base;
 #endif
 
 /**
- * A computation: its cancel flag, progress, polls, warnings and phase times. Cheap: create one for every cook.
+ * A computation: its cancel flag, progress, polls, warnings and phase times. Cheap: create one for each cook (evaluation of a node).
  */
 typedef struct frz_context frz_context;
 
@@ -1795,7 +1795,7 @@ typedef struct {
      */
     double removed_volume;
     /**
-     * Grains that removed snow has paid for but that are not born yet: fractions, and those for which there was no room.
+     * Grains due from removed snow that are not born yet: fractions of a grain, and those for which there was no room.
      */
     double owed;
     /**
@@ -2603,13 +2603,13 @@ typedef struct {
      */
     double margin;
     /**
-     * Depth of its rim below them and below dry ground; default 0.1. More than the margin.
+     * Depth of the surface's rim below the mesh's vertices and below dry ground; default 0.1. More than the margin.
      */
     double rim;
 } frz_shallow_distance;
 
 /**
- * Statistics of the vertices of the mesh that face up, of those that a call visited.
+ * Counts of the mesh's vertices that face up, among those that a call visited.
  */
 typedef struct {
     /**
@@ -2621,7 +2621,7 @@ typedef struct {
      */
     uint32_t reserved;
     /**
-     * Their number.
+     * All of them.
      */
     uint64_t upward;
     /**
@@ -4768,10 +4768,10 @@ frz_status frz_shallow_find_ledges(frz_context *context,
  * with FRZ_SHALLOW_LIFTED (a real-time call: see frz_shallow). They change what is shown, not the flow. It visits all triangles once. Call
  * it again after frz_shallow_update_terrain or frz_shallow_set_bodies have moved something, before the next such surface.
  *
- * distance: NULL for the defaults. If it differs from the one before, all columns must be found.
+ * distance: NULL for the defaults. If it differs from that of the last call, pass NULL for bounds.
  * bounds: double[4], minimum x, minimum z, maximum x and maximum z (m) of all triangles and bodies that have moved since the last call, at
  *     their old and their new positions. NULL, and the first time: all columns.
- * fitted: receives statistics of the vertices, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+ * fitted: receives counts of the vertices, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
  *
  * One thread at a time.
  */
@@ -5242,8 +5242,8 @@ frz_status frz_shallow_detail_pour(frz_shallow_detail *detail,
 frz_status frz_shallow_detail_fill(frz_shallow_detail *detail, double height);
 
 /**
- * Reports where all liquid is, and where it came from. Less than a cell's share of four units waits for the rest of a unit of large cells:
- * it is part of held.
+ * Reports where all liquid is, and where it came from. The remainder of each large cell, less than its unit, which is four units of small
+ * cells, is part of held.
  *
  * balance: receives it, all zeroes after a failure. Its struct_size is set by the caller.
  *

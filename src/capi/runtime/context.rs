@@ -13,7 +13,7 @@ use crate::capi::ffi::*;
 use crate::context::{Context, PhaseTime, Phases, Progress, Running, machine_memory};
 use crate::error::Error;
 
-/// A computation: its cancel flag, progress, polls, warnings and phase times. Cheap: create one for every cook.
+/// A computation: its cancel flag, progress, polls, warnings and phase times. Cheap: create one for each cook (evaluation of a node).
 pub struct frz_context {
     _opaque: [u8; 0],
 }

@@ -30,8 +30,8 @@ pub enum frz_liquid {
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_shallow_pace {
-    /// Steps of at most frz_shallow_params.longest_step: where liquid is too deep for that its waves slow down, and films on slopes that
-    /// are too fast are slowed down.
+    /// Steps of at most frz_shallow_params.longest_step: waves in liquid that is too deep for such a step are slowed down, and so are films
+    /// on slopes that are too fast for it.
     FRZ_SHALLOW_REALTIME = 0,
     /// As many steps as stability requires.
     FRZ_SHALLOW_EXACT = 1,

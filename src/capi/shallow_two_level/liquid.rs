@@ -293,8 +293,8 @@ pub unsafe extern "C" fn frz_shallow_detail_fill(detail: *mut frz_shallow_detail
     })
 }
 
-/// Reports where all liquid is, and where it came from. Less than a cell's share of four units waits for the rest of a unit of large cells:
-/// it is part of held.
+/// Reports where all liquid is, and where it came from. The remainder of each large cell, less than its unit, which is four units of small
+/// cells, is part of held.
 ///
 /// balance: receives it, all zeroes after a failure. Its struct_size is set by the caller.
 ///

@@ -48,7 +48,7 @@ pub struct frz_grains_report {
     pub trapped: u64,
     /// Snow that the base layer lost (m3).
     pub removed_volume: f64,
-    /// Grains that removed snow has paid for but that are not born yet: fractions, and those for which there was no room.
+    /// Grains due from removed snow that are not born yet: fractions of a grain, and those for which there was no room.
     pub owed: f64,
     /// Largest speed (m/s).
     pub fastest: f64,
@@ -89,8 +89,10 @@ impl GrainsHandle {
         unsafe {
             let params = given_or_defaults(params)?;
             let own = params.params()?;
-            let (new, resume) = (|| Ok(Grains::new(own)?), |state: &[u8]| Grains::resume(own, state));
-            let grains = new_or_resumed(ctx, "grains", restart, new, Grains::unpacked, resume)?;
+            let new = || Ok(Grains::new(own)?);
+            let grains = new_or_resumed(ctx, "grains", restart, new, Grains::unpacked, |state| {
+                Grains::resume(own, state)
+            })?;
             Ok(Self { grains, ground: params.ground(), shapes: Shapes::new(), saved: Saved::default() })
         }
     }

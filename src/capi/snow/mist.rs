@@ -85,9 +85,10 @@ impl MistHandle {
         unsafe {
             let params = given_or_defaults(params)?;
             let own = params.params()?;
-            let (new, resume) =
-                (|| Ok(Mist::new(own.clone())?), |state: &[u8]| Mist::resume(own.clone(), state));
-            let mist = new_or_resumed(ctx, "mist", restart, new, Mist::unpacked, resume)?;
+            let new = || Ok(Mist::new(own.clone())?);
+            let mist = new_or_resumed(ctx, "mist", restart, new, Mist::unpacked, |state| {
+                Mist::resume(own.clone(), state)
+            })?;
             Ok(Self { mist, floor: params.ground(), shapes: Shapes::new(), saved: Saved::default() })
         }
     }

@@ -120,7 +120,7 @@ impl TrackerHandle {
         // SAFETY: guaranteed by the caller.
         let mesh = unsafe { read(mesh) }?;
         let triangles = &mesh.triangles;
-        let new = || {
+        let new = || -> Outcome<Tracker> {
             // SAFETY: as above.
             let particles = unsafe { self::particles(particles) }?;
             if params.rebuild && !Orientation::of_mesh(triangles, Closing::Caps).is_unchanged() {

@@ -20,7 +20,7 @@ pub struct frz_shallow_distance {
     pub least: f64,
     /// Height of the surface over the mesh's vertices; default 0.01.
     pub margin: f64,
-    /// Depth of its rim below them and below dry ground; default 0.1. More than the margin.
+    /// Depth of the surface's rim below the mesh's vertices and below dry ground; default 0.1. More than the margin.
     pub rim: f64,
 }
 
@@ -28,7 +28,7 @@ sized32!(frz_shallow_distance, [], Distance::default().into());
 
 fields_of!(Distance <=> frz_shallow_distance { least, margin, rim });
 
-/// Statistics of the vertices of the mesh that face up, of those that a call visited.
+/// Counts of the mesh's vertices that face up, among those that a call visited.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_fitted {
@@ -36,7 +36,7 @@ pub struct frz_shallow_fitted {
     pub struct_size: u32,
     /// Reserved.
     pub reserved: u32,
-    /// Their number.
+    /// All of them.
     pub upward: u64,
     /// Those of them more than a cell above the surrounding ground: they may be above the surface.
     pub discarded: u64,
@@ -52,10 +52,10 @@ fields_of!(Fitted => frz_shallow_fitted { upward, discarded, capped });
 /// with FRZ_SHALLOW_LIFTED (a real-time call: see frz_shallow). They change what is shown, not the flow. It visits all triangles once. Call
 /// it again after frz_shallow_update_terrain or frz_shallow_set_bodies have moved something, before the next such surface.
 ///
-/// distance: NULL for the defaults. If it differs from the one before, all columns must be found.
+/// distance: NULL for the defaults. If it differs from that of the last call, pass NULL for bounds.
 /// bounds: double[4], minimum x, minimum z, maximum x and maximum z (m) of all triangles and bodies that have moved since the last call, at
 ///     their old and their new positions. NULL, and the first time: all columns.
-/// fitted: receives statistics of the vertices, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+/// fitted: receives counts of the vertices, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
