@@ -29,7 +29,7 @@ pub struct Shell {
     pub stick: f32,
     triangles: Vec<[u32; 3]>,
     /// Whether it has an inside.
-    closed: bool,
+    has_inside: bool,
     /// For ground: the bits of the sides and corners of each triangle that lie on the rim of a sheet ([`RIM_CORNER`]).
     rims: Option<Vec<u8>>,
     now: Vec<DVec3>,
@@ -66,7 +66,7 @@ pub struct Nearest {
 
 impl Shell {
     /// A mesh of triangles, counter-clockwise seen from outside, at a pose (m).
-    pub fn new(friction: f32, triangles: Vec<[u32; 3]>, closed: bool, pose: Vec<DVec3>) -> Self {
+    pub fn new(friction: f32, triangles: Vec<[u32; 3]>, has_inside: bool, pose: Vec<DVec3>) -> Self {
         let leaves = triangles.len().div_ceil(LEAF).max(1).next_power_of_two();
         let next = pose.clone();
         let boxes = vec![[DVec3::zeros(); 2]; 2 * leaves - 1];
@@ -78,7 +78,7 @@ impl Shell {
             friction,
             stick,
             triangles,
-            closed,
+            has_inside,
             rims: None,
             now,
             next,
@@ -229,7 +229,7 @@ impl Shell {
     /// Distance (m) of a position from its nearest point, whether it is inside, and the outward direction.
     fn side(&self, position: DVec3, nearest: &Nearest) -> (f64, bool, DVec3) {
         let distance = nearest.square.sqrt();
-        let inside = self.closed && nearest.height < 0.0 && !nearest.is_on_rim;
+        let inside = self.has_inside && nearest.height < 0.0 && !nearest.is_on_rim;
         let out = if distance > MIN_DISTANCE {
             (position - nearest.point) * (if inside { -1.0 } else { 1.0 } / distance)
         } else {

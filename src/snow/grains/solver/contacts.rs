@@ -189,7 +189,7 @@ struct Cells {
     end: u8,
 }
 
-/// For each cell of a block, the cells with whose grains its own may form pairs: in the same block the adjacent ones before it
+/// For each cell of a block, the cells whose grains may form pairs with its own: in the same block the adjacent ones before it
 /// (ordered by y, x, z) but not itself, in earlier blocks all adjacent ones.
 static NEAR_CELLS: LazyLock<Vec<Vec<Cells>>> = LazyLock::new(|| {
     let cells = CELLS as i32;

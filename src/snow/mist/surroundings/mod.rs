@@ -311,7 +311,7 @@ impl Walls<'_> {
         Ok(())
     }
 
-    /// The triangles of an object, with their displacements over the preceding [`INSTANT`].
+    /// The triangles of an object, with their displacements back to where they were an [`INSTANT`] before.
     fn surface(&self, index: usize, share: f64) -> Result<Surface> {
         let body = &self.bodies[index];
         let (mut now, mut before) = (Vec::new(), Vec::new());
@@ -331,7 +331,7 @@ struct Surface {
     /// Index of the object.
     body: usize,
     shell: Shell,
-    /// Inverse of the time (1/s) over which its displacements are measured.
+    /// Minus the inverse of the time (1/s) over which its displacements, which lead backward, are measured.
     rate: f64,
 }
 
