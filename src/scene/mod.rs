@@ -33,7 +33,7 @@ pub use schema::{FrameChoice, Frames, Override, Value, Values};
 pub use shallow::Shallow;
 #[cfg(feature = "vdb")]
 pub use snow::{
-    Forecast, Inputs, Rebuild, RebuildGrains, Walk, changes_since, check_memory, estimate, partial,
+    FootSlip, Forecast, Inputs, Rebuild, RebuildGrains, changes_since, check_memory, estimate, partial,
 };
 pub use surface::Surface;
 pub use systems::{reference, template};

@@ -43,8 +43,8 @@ pub struct Report {
     pub settings: BTreeMap<String, Value>,
 }
 
-/// Checks a scene whose inputs are open; `folder` is its output folder: the base there tells how many grains there will be, and the mist
-/// how far it spreads.
+/// Checks a scene whose inputs are open. `folder` is its output folder: the number of grains is estimated from the base there, and the
+/// extent of mist from the mist there.
 ///
 /// # Errors
 /// A frame that cannot be read or does not match the others; a damaged record of the base; cancel.
@@ -55,10 +55,10 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs, folder: Option<&Path
     }
     let relief = Relief::new(inputs);
     let mut objects = Vec::new();
-    let courses = ObjectPath::all(ctx, scene, inputs)?;
-    for course in &courses {
-        let report = course.report(relief.as_ref())?;
-        warnings.extend(course.warnings(ctx, &report)?);
+    let paths = ObjectPath::all(ctx, scene, inputs)?;
+    for path in &paths {
+        let report = path.report(relief.as_ref())?;
+        warnings.extend(path.warnings(ctx, &report)?);
         objects.push(report);
     }
     warnings.extend(inputs.far_static(scene));
@@ -73,7 +73,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs, folder: Option<&Path
     };
     let mist = folder.filter(|_| has_mist(&scene.values));
     let mist = mist.map(|folder| DoneFrames::read(folder, "mist")).transpose()?;
-    let mist = MistForecast::of(ctx, scene, &courses, mist.as_ref())?;
+    let mist = MistForecast::of(ctx, scene, &paths, mist.as_ref())?;
     let (memory, disk) = match &grains {
         Some(grains) => {
             let volumes = memory::of_volumes(scene, inputs, grains.grains)?;

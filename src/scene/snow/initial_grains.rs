@@ -19,15 +19,15 @@ use crate::scene::schema::rounded;
 use crate::snow::grains::{Grains, MAX_SPEED, Params};
 use crate::vdb::{FloatGrid, points};
 
-/// Points that are tested as grains together.
-const RUN: usize = 4096;
-/// Depth (diameters) in the snow or below the ground from which a point does not become a grain.
-const DEEP: f64 = 0.1;
-/// Share of the grains' radius by which a file's own may differ before it is reported.
-const OTHER_SIZE: f64 = 0.01;
+/// Number of points that are tested together.
+const BATCH: usize = 4096;
+/// Points deeper than this (diameters) in the snow or below the ground do not become grains.
+const MAX_DEPTH: f64 = 0.1;
+/// Relative difference of a file's `pscale` from the grains' radius above which it is reported.
+const SIZE_TOLERANCE: f64 = 0.01;
 
-/// Loose grains of a file.
-pub struct Drift {
+/// Grains read from a file.
+pub struct InitialGrains {
     /// Positions (m).
     pub positions: Vec<DVec3>,
     /// Velocities (m/s), from the attribute `v`; empty if there is none.
@@ -39,7 +39,7 @@ pub fn file(scene: &Scene) -> Option<&Path> {
     scene.values.table("grains").value("initial")?.path()
 }
 
-impl Drift {
+impl InitialGrains {
     /// The initial grains of a scene with cells of this size (m); adds warnings about data of the file that is not used.
     ///
     /// # Errors
@@ -53,8 +53,8 @@ impl Drift {
         let Some(path) = file(scene) else { return Ok(None) };
         input_hashes.hash(path)?;
         let (positions, attributes) = if extension(path) == "ply" {
-            let cloud = ply::read(path)?;
-            (cloud.positions, cloud.attributes)
+            let data = ply::read(path)?;
+            (data.positions, data.attributes)
         } else {
             if let Some(since) = changes_since(path)? {
                 return Err(Error::file(path, partial(since)));
@@ -73,15 +73,15 @@ impl Drift {
         };
         let params = params(scene, cell);
         if let (Some(Values::Float(own)), false) = (values("pscale"), positions.is_empty()) {
-            warnings.extend(other_size(path, own.stored(), params.radius));
+            warnings.extend(size_warning(path, own.stored(), params.radius));
         }
-        let drift = Self { positions, velocities };
-        drift.check(params).map_err(|what| Error::file(path, what))?;
-        Ok(Some(drift))
+        let initial = Self { positions, velocities };
+        initial.check(params).map_err(|what| Error::file(path, what))?;
+        Ok(Some(initial))
     }
 
-    /// Positions (m) and velocities (m/s) of the grains that are neither in a layer nor below the ground, a mesh and the height of a floor (m), for
-    /// a radius (m).
+    /// Positions (m) and velocities (m/s) of the grains that are neither in a layer nor below the ground, which is a mesh or a floor at a
+    /// height (m); `radius` is that of a grain (m).
     ///
     /// # Errors
     /// Errors of the grid; cancel.
@@ -92,19 +92,19 @@ impl Drift {
         layer: &FloatGrid,
         radius: f64,
     ) -> Result<(Vec<DVec3>, Vec<[f32; 3]>)> {
-        let deep = DEEP * 2.0 * radius;
+        let max_depth = MAX_DEPTH * 2.0 * radius;
         let mut distances = Vec::new();
         layer.sample_linear(ctx, &self.positions, &mut distances)?;
         let ground = ground.map(|mesh| (mesh, Bvh::new(mesh)));
         let is_below = |position: &DVec3| {
-            floor.is_some_and(|floor| position.y < floor - deep)
-                || ground.as_ref().is_some_and(|(mesh, tree)| is_below(mesh, tree, *position, deep))
+            floor.is_some_and(|floor| position.y < floor - max_depth)
+                || ground.as_ref().is_some_and(|(mesh, tree)| is_below(mesh, tree, *position, max_depth))
         };
         let is_outside =
-            |point: &usize| f64::from(distances[*point]) >= -deep && !is_below(&self.positions[*point]);
-        let kept: Vec<usize> = (0..self.positions.len()).into_par_iter().filter(is_outside).collect();
-        let positions = kept.iter().map(|point| self.positions[*point]).collect();
-        let velocities = kept.iter().filter_map(|point| self.velocities.get(*point).copied()).collect();
+            |point: &usize| f64::from(distances[*point]) >= -max_depth && !is_below(&self.positions[*point]);
+        let outside: Vec<usize> = (0..self.positions.len()).into_par_iter().filter(is_outside).collect();
+        let positions = outside.iter().map(|point| self.positions[*point]).collect();
+        let velocities = outside.iter().filter_map(|point| self.velocities.get(*point).copied()).collect();
         Ok((positions, velocities))
     }
 
@@ -127,11 +127,11 @@ impl Drift {
         }
         // Their number is checked elsewhere.
         let params = Params { max_grains: usize::MAX, ..params };
-        let fits = |positions: &[DVec3]| Grains::new(params)?.emit(positions, &[], 0);
-        for (run, positions) in self.positions.chunks(RUN).enumerate() {
-            let Err(error) = fits(positions) else { continue };
-            return Err(match positions.iter().position(|position| fits(&[*position]).is_err()) {
-                Some(point) => format!("point {} is too far from the origin", run * RUN + point + 1),
+        let emit = |positions: &[DVec3]| Grains::new(params)?.emit(positions, &[], 0);
+        for (batch, positions) in self.positions.chunks(BATCH).enumerate() {
+            let Err(error) = emit(positions) else { continue };
+            return Err(match positions.iter().position(|position| emit(&[*position]).is_err()) {
+                Some(point) => format!("point {} is too far from the origin", batch * BATCH + point + 1),
                 None => error.to_string(),
             });
         }
@@ -139,16 +139,16 @@ impl Drift {
     }
 }
 
-/// Whether a position is more than a depth (m) below a mesh seen from above: the next triangle above it faces up.
-fn is_below(mesh: &TriMesh, tree: &Bvh, position: DVec3, deep: f64) -> bool {
+/// Whether a position is more than `depth` (m) below a mesh: the next triangle above it faces up.
+fn is_below(mesh: &TriMesh, tree: &Bvh, position: DVec3, depth: f64) -> bool {
     let Some(hit) = tree.ray(position, DVec3::y(), f64::INFINITY) else { return false };
     let [a, b, c] = mesh.triangles[hit.triangle].map(|vertex| mesh.positions[vertex as usize]);
-    hit.distance > deep && (b - a).cross(&(c - a)).y > 0.0
+    hit.distance > depth && (b - a).cross(&(c - a)).y > 0.0
 }
 
-/// The warning about points with another radius (m) than the grains.
-fn other_size(path: &Path, own: &[f32], radius: f64) -> Option<String> {
-    let differs = |own: &&f32| (f64::from(**own) - radius).abs() > OTHER_SIZE * radius;
+/// The warning about points whose radius differs from that of the grains (m).
+fn size_warning(path: &Path, own: &[f32], radius: f64) -> Option<String> {
+    let differs = |own: &&f32| (f64::from(**own) - radius).abs() > SIZE_TOLERANCE * radius;
     own.iter().find(differs).map(|own| {
         format!(
             "{}: its pscale ({} m) is not used: all grains have grains.radius = {} m",

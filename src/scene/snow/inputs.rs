@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::initial_grains::Drift;
+use super::initial_grains::InitialGrains;
 use super::inspect::warnings::{replaced, too_small};
 use super::wind;
 use crate::context::Context;
@@ -25,7 +25,7 @@ use crate::vdb::{FloatGrid, GridClass, VectorGrid, distances, file};
 const HALF_WIDTH: f32 = 3.0;
 
 /// Advice about a mesh of ground or top that lies far from the origin.
-const FOR_SNOW: &str = "give snow.origin nearby, which is subtracted in 64 bits, or save it near the origin and move the scene there too";
+const ORIGIN_ADVICE: &str = "give snow.origin nearby, which is subtracted in 64 bits, or save it near the origin and move the scene there too";
 
 /// Contents of a scene's files.
 pub struct Inputs {
@@ -35,8 +35,8 @@ pub struct Inputs {
     statics: Vec<TriMesh>,
     /// The objects that move through the snow.
     pub bodies: Vec<Body>,
-    /// Initial grains.
-    pub(super) drift: Option<Drift>,
+    /// Grains at the first frame.
+    pub(super) initial_grains: Option<InitialGrains>,
     /// Wind that varies in space.
     pub(super) wind: Option<VectorGrid>,
     /// Contents of the files when they were read.
@@ -45,21 +45,16 @@ pub struct Inputs {
     pub warnings: Vec<String>,
 }
 
-/// Source of the first layer.
+/// Where the initial layer comes from.
 enum Source {
-    Made {
-        ground: initial::Ground,
-        cover: Cover,
-    },
+    /// Built from the ground and a depth or top.
+    Made { ground: initial::Ground, cover: Cover },
     /// A level set from a file; only grains lie on the ground.
-    Given {
-        grid: FloatGrid,
-        ground: Option<Under>,
-    },
+    Given { grid: FloatGrid, ground: Option<GroundBelow> },
 }
 
-/// A ground without an area.
-enum Under {
+/// The ground below a given layer: it needs no area.
+enum GroundBelow {
     Level(f64),
     Mesh(TriMesh),
 }
@@ -76,7 +71,7 @@ impl Inputs {
         let source = match &snow.layer {
             Layer::Grid(path) => {
                 let grid = layer_grid(path, snow.cell, &input_hashes)?;
-                Source::Given { grid, ground: under(&snow, &input_hashes, &mut warnings)? }
+                Source::Given { grid, ground: ground_below(&snow, &input_hashes, &mut warnings)? }
             }
             Layer::Depth(depth) => Source::Made {
                 ground: ground(&snow, &input_hashes, &mut warnings)?,
@@ -96,9 +91,9 @@ impl Inputs {
         }
         let meshes = || snow.files().filter_map(|(key, path)| Some((&**path, source.mesh(key)?)));
         warnings.extend(meshes().filter_map(|(path, mesh)| {
-            far_mesh(&path.display().to_string(), mesh.farthest(), 1.0, snow.cell, FOR_SNOW)
+            far_mesh(&path.display().to_string(), mesh.farthest(), 1.0, snow.cell, ORIGIN_ADVICE)
         }));
-        warnings.extend(meshes().filter_map(|(path, mesh)| unclear_corners(path, mesh)));
+        warnings.extend(meshes().filter_map(|(path, mesh)| ambiguous_corners(path, mesh)));
         let start = scene.shot.time(scene.shot.frames.first);
         let (mut statics, mut bodies) = (Vec::new(), Vec::new());
         for (index, object) in scene.objects.iter().enumerate() {
@@ -108,8 +103,8 @@ impl Inputs {
             let motion = motion(scene, object, &input_hashes, &mut warnings)?;
             let (name, file) = (object_name(index, object), object.file.display());
             if object.role == Role::Static {
-                let (mesh, unclear) = posed(&*motion, start)?;
-                warnings.extend(unclear.map(|what| format!("{file}: {what}")));
+                let (mesh, ambiguous) = posed(&*motion, start)?;
+                warnings.extend(ambiguous.map(|what| format!("{file}: {what}")));
                 statics.push(oriented(mesh, &name, &mut warnings));
                 continue;
             }
@@ -124,20 +119,20 @@ impl Inputs {
             bodies.push(body);
         }
         warnings.extend(replaced(&scene.values));
-        let drift = Drift::of(scene, snow.cell, &input_hashes, &mut warnings)?;
+        let initial_grains = InitialGrains::of(scene, snow.cell, &input_hashes, &mut warnings)?;
         let wind = match wind::wind_file(scene) {
             None => None,
             Some(path) => Some(input_hashes.around(path, || wind::wind(path))?),
         };
         warnings.iter().for_each(|warning| log::warn!("{warning}"));
-        Ok(Self { snow, source, statics, bodies, drift, wind, input_hashes, warnings })
+        Ok(Self { snow, source, statics, bodies, initial_grains, wind, input_hashes, warnings })
     }
 
     /// Minimum and maximum x and z of the snow (m), if known before it is made.
     pub fn area(&self) -> Option<[f64; 4]> {
         match &self.source {
             Source::Made { ground, .. } => {
-                let (low, high) = bounds_of(ground)?;
+                let (low, high) = ground_bounds(ground)?;
                 Some([low.x, low.z, high.x, high.z])
             }
             Source::Given { .. } => None,
@@ -150,7 +145,7 @@ impl Inputs {
         match (&self.source, &self.snow.layer) {
             (Source::Made { cover: Cover::Top(top), .. }, _) => highest(top),
             (Source::Made { ground, .. }, Layer::Depth(depth)) => {
-                let (_, ground) = bounds_of(ground)?;
+                let (_, ground) = ground_bounds(ground)?;
                 let statics = self.statics.iter().filter_map(highest).fold(f64::NEG_INFINITY, f64::max);
                 Some(ground.y.max(statics) + depth)
             }
@@ -167,11 +162,12 @@ impl Inputs {
                 return Some((corner(low), corner(high)));
             }
             Source::Made { ground, cover } => {
-                (ground, if let Cover::Top(top) = cover { of_mesh(top) } else { None })
+                (ground, if let Cover::Top(top) = cover { mesh_bounds(top) } else { None })
             }
         };
-        let all = self.statics.iter().map(of_mesh).chain([top]).flatten();
-        let (low, mut high) = all.fold(bounds_of(ground)?, |(low, high), (l, h)| (low.inf(&l), high.sup(&h)));
+        let all = self.statics.iter().map(mesh_bounds).chain([top]).flatten();
+        let (low, mut high) =
+            all.fold(ground_bounds(ground)?, |(low, high), (l, h)| (low.inf(&l), high.sup(&h)));
         if let Layer::Depth(depth) = &self.snow.layer {
             high.y += depth;
         }
@@ -213,7 +209,7 @@ impl Inputs {
     pub(super) fn floor(&self) -> Option<f64> {
         match &self.source {
             Source::Made { ground: initial::Ground::Plane { height, .. }, .. } => Some(*height),
-            Source::Given { ground: Some(Under::Level(height)), .. } => Some(*height),
+            Source::Given { ground: Some(GroundBelow::Level(height)), .. } => Some(*height),
             _ => None,
         }
     }
@@ -223,7 +219,7 @@ impl Inputs {
         self.source.mesh("snow.ground")
     }
 
-    /// Static objects, which the snow lies on.
+    /// The static objects, on which the snow lies.
     pub(super) fn statics(&self) -> &[TriMesh] {
         &self.statics
     }
@@ -255,7 +251,7 @@ impl Source {
     fn mesh(&self, key: &str) -> Option<&TriMesh> {
         match (key, self) {
             ("snow.ground", Self::Made { ground: initial::Ground::Mesh(mesh), .. })
-            | ("snow.ground", Self::Given { ground: Some(Under::Mesh(mesh)), .. })
+            | ("snow.ground", Self::Given { ground: Some(GroundBelow::Mesh(mesh)), .. })
             | ("snow.top", Self::Made { cover: Cover::Top(mesh), .. }) => Some(mesh),
             _ => None,
         }
@@ -263,17 +259,17 @@ impl Source {
 }
 
 /// Minimum and maximum corner of a mesh (m).
-fn of_mesh(mesh: &TriMesh) -> Option<(DVec3, DVec3)> {
+fn mesh_bounds(mesh: &TriMesh) -> Option<(DVec3, DVec3)> {
     mesh.bounds().map(|(low, high)| (low.cast(), high.cast()))
 }
 
 /// Minimum and maximum corner of the snow's ground (m).
-fn bounds_of(ground: &initial::Ground) -> Option<(DVec3, DVec3)> {
+fn ground_bounds(ground: &initial::Ground) -> Option<(DVec3, DVec3)> {
     match ground {
         initial::Ground::Plane { height, area: [x0, z0, x1, z1] } => {
             Some((DVec3::new(*x0, *height, *z0), DVec3::new(*x1, *height, *z1)))
         }
-        initial::Ground::Mesh(mesh) => of_mesh(mesh),
+        initial::Ground::Mesh(mesh) => mesh_bounds(mesh),
     }
 }
 
@@ -309,17 +305,21 @@ fn ground(snow: &Snow, input_hashes: &InputHashes, warnings: &mut Vec<String>) -
     }
 }
 
-/// The ground beside a given layer.
-fn under(snow: &Snow, input_hashes: &InputHashes, warnings: &mut Vec<String>) -> Result<Option<Under>> {
+/// The ground below a given layer.
+fn ground_below(
+    snow: &Snow,
+    input_hashes: &InputHashes,
+    warnings: &mut Vec<String>,
+) -> Result<Option<GroundBelow>> {
     Ok(match &snow.ground {
         None => None,
-        Some(Ground::Plane { height, .. }) => Some(Under::Level(*height)),
-        Some(Ground::Mesh(path)) => Some(Under::Mesh(read_mesh(path, snow, input_hashes, warnings)?)),
+        Some(Ground::Plane { height, .. }) => Some(GroundBelow::Level(*height)),
+        Some(Ground::Mesh(path)) => Some(GroundBelow::Mesh(read_mesh(path, snow, input_hashes, warnings)?)),
     })
 }
 
-/// The warning about corners of a mesh of ground or top that rounding does not decide.
-fn unclear_corners(path: &Path, mesh: &TriMesh) -> Option<String> {
+/// The warning about vertices of a mesh that may or may not be the same corner, as they differ by rounding errors only.
+fn ambiguous_corners(path: &Path, mesh: &TriMesh) -> Option<String> {
     let positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
     let what = Weld::of(&positions, &mesh.triangles).warning();
     what.map(|what| format!("{}: {what}", path.display()))
@@ -416,11 +416,11 @@ fn character(scene: &Scene, object: &Object, input_hashes: &InputHashes) -> Resu
     Ok(character)
 }
 
-/// A motion's mesh at a time (s), with vertices that are one corner at one position, and a warning about ambiguous ones.
+/// A motion's mesh at a time (s), with the vertices of a corner moved to one position, and a warning about ambiguous ones.
 fn posed(motion: &dyn Motion, time: f64) -> Result<(TriMesh, Option<String>)> {
     let mut pose = Vec::new();
     motion.pose_as_read(time, &mut pose)?;
-    // After transforms the rounding of its coordinates is no longer known.
+    // Vertices are matched before transforms, which add rounding errors.
     let weld = Weld::of(&pose, motion.triangles());
     motion.pose(time, &mut pose)?;
     weld.unify(&mut pose);

@@ -33,7 +33,7 @@ pub use {
     estimate::memory::{check as check_memory, estimate},
     estimate::mist::MistForecast,
     inputs::Inputs,
-    inspect::foot_slip::Walk,
+    inspect::foot_slip::FootSlip,
     pipeline::pipeline,
     stages::grain_files::{RebuildGrains, changes_since, partial},
     stages::rebuild::Rebuild,

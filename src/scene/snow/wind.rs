@@ -1,4 +1,4 @@
-//! The wind of a scene's mist, as a file has it.
+//! Reads the wind that carries a scene's mist from a .vdb file.
 
 use std::path::Path;
 

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::Inputs;
 use super::estimate::disk::FrameSize;
-use super::estimate::memory::Most;
+use super::estimate::memory::MaxBytes;
 use super::inputs::all_files;
 use super::inputs::particle_times::read;
 use crate::context::Context;
@@ -26,17 +26,17 @@ pub struct Report {
     pub files: usize,
     /// Minimum and maximum count of particles in a file; may be 0.
     pub particles: [usize; 2],
-    /// Whether all files have ids, and velocities.
+    /// Whether all files have ids.
     pub has_ids: bool,
-    /// See `has_ids`.
+    /// Whether all files have velocities.
     pub has_velocities: bool,
     /// Minimum and maximum position of a particle over the shot (m).
     pub particles_bounds_m: [[f64; 3]; 2],
     /// Initial distance between particles (m).
     pub spacing_m: f64,
-    /// Vertices and triangles of the mesh.
+    /// Vertices of the mesh.
     pub vertices: usize,
-    /// See `vertices`.
+    /// Triangles of the mesh.
     pub triangles: usize,
     /// Width, height and depth of the mesh at the first frame (m).
     pub size_m: [f64; 3],
@@ -78,15 +78,15 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     let (surface, shot) = (scene.surface()?, scene.shot);
     let mut warnings = inputs.warnings.clone();
     let mut bounds: Option<[DVec3; 2]> = None;
-    let (mut least, mut most) = (usize::MAX, 0);
+    let (mut min_count, mut max_count) = (usize::MAX, 0);
     let (mut has_ids, mut has_velocities) = (true, true);
     let files = all_files(scene, surface);
     let (mut before, mut has_warned): (Option<Particles>, bool) = (None, false);
-    let mut most_bytes = Most::default();
+    let mut max_bytes = MaxBytes::default();
     for path in &files {
         ctx.check()?;
         let particles = read(path, surface, &inputs.input_hashes)?;
-        ctx.pool().install(|| most_bytes.add(&particles, inputs.spacing, surface.cell));
+        ctx.pool().install(|| max_bytes.add(&particles, inputs.spacing, surface.cell));
         if let Some(before) = before.take().filter(|_| !has_warned) {
             // Particles with neither ids nor velocities are reported below.
             let compared = || disagreement(&before, &particles, 1.0 / shot.fps, inputs.spacing);
@@ -96,7 +96,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
             }
         }
         let Particles { positions, velocities, ids } = &particles;
-        (least, most) = (least.min(positions.len()), most.max(positions.len()));
+        (min_count, max_count) = (min_count.min(positions.len()), max_count.max(positions.len()));
         has_ids &= !ids.is_empty() || positions.is_empty();
         has_velocities &= !velocities.is_empty() || positions.is_empty();
         bounds = positions.iter().fold(bounds, |bounds, p| {
@@ -106,8 +106,8 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
         before = Some(particles);
     }
     let mesh = &inputs.mesh.mesh;
-    let (from, to) = mesh.bounds().unwrap_or_default();
-    let (from, to) = (from.cast::<f64>(), to.cast::<f64>());
+    let (low, high) = mesh.bounds().unwrap_or_default();
+    let (low, high) = (low.cast::<f64>(), high.cast::<f64>());
     let edges = mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
     let length =
         |[a, b]: [u32; 2]| f64::from((mesh.positions[a as usize] - mesh.positions[b as usize]).norm());
@@ -118,7 +118,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
             "the mesh's edges are {edge:.4} m long, particles {spacing:.4} m apart: a mesh that coarse cannot follow them closely"
         ));
     }
-    if let Some(share) = outside(&inputs.particles.positions, from, to, spacing) {
+    if let Some(share) = outside(&inputs.particles.positions, low, high, spacing) {
         warnings.push(format!(
             "{:.0} % of the first frame's particles lie outside of the mesh's bounds: are both in the same space and unit?",
             100.0 * share
@@ -134,16 +134,16 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
         frames: [shot.frames.first, shot.frames.last],
         fps: shot.fps,
         files: files.len(),
-        particles: [least, most],
+        particles: [min_count, max_count],
         has_ids,
         has_velocities,
         particles_bounds_m: bounds.unwrap_or_default().map(Into::into),
         spacing_m: spacing,
         vertices: mesh.positions.len(),
         triangles: mesh.triangles.len(),
-        size_m: (to - from).into(),
+        size_m: (high - low).into(),
         edge_m: edge,
-        memory_bytes: most_bytes.estimate(surface, files.len(), &inputs.mesh, &frame),
+        memory_bytes: max_bytes.estimate(surface, files.len(), &inputs.mesh, &frame),
         disk_bytes: count * frame.sum(),
         frame_bytes: frame.sum(),
         warnings,

@@ -5,14 +5,14 @@ use crate::scene::schema::declaration::Kind::{Choice, Choices, File, Flag, Numbe
 use crate::scene::schema::declaration::{Key, Scope, Scopes, key, optional, or, required};
 use crate::scene::schema::{NO_ORIGIN, ORIGIN, ORIGIN_MEANS};
 
-/// Last extensions of particle files: "gz" is that of .bgeo.gz.
+/// Extensions of particle files, of which "gz" is that of .bgeo.gz.
 const PARTICLES: &[&str] = &["bgeo", "bhclassic", "gz", "ply", "vdb", "vtk", "vtu", "xyz"];
 
 const FIRST: Scopes = &[("surface", Scope::First)];
 const STEP: Scopes = &[("surface", Scope::Step)];
 const OUTPUT: Scopes = &[("surface", Scope::Output)];
 
-/// All of them.
+/// The keys of a mesh that follows a liquid.
 pub const KEYS: &[Key] = &[
     key(FIRST, "surface", "particles", File(PARTICLES), required("\"spot.%04d.bgeo\"").shown())
         .means("of the liquid: a sequence \"spot.%04d.bgeo\""),

@@ -52,9 +52,9 @@ pub struct Surface {
     pub change: f64,
     /// Whether the mesh is rebuilt where the liquid merges or splits; else it is flagged there.
     pub rebuild: bool,
-    /// If it is rebuilt: whether its topology is matched everywhere in every step; else where vertices are flagged.
+    /// If it is rebuilt: whether its topology is matched everywhere in every step; else only where vertices are flagged.
     pub every: bool,
-    /// If it is rebuilt: minimum count of particles in a part of it.
+    /// If it is rebuilt: parts with fewer particles are removed, except the last part.
     pub min_drop: usize,
     /// If it is rebuilt: number of frames before a change over which it eases towards it (0..=100).
     pub ahead: i32,
@@ -77,40 +77,40 @@ pub struct Files {
     pub obj: bool,
     /// `surface/surface.%04d.usda`.
     pub usd: bool,
-    /// Velocities over the coming frame.
+    /// The arrays of velocities over the coming frame.
     pub velocities: bool,
-    /// The distance that each vertex keeps.
+    /// The array `delta`: the distance from the particles' surface that each vertex keeps.
     pub delta: bool,
-    /// Whether a vertex is flagged.
+    /// The array `flagged`: whether a vertex is flagged.
     pub flagged: bool,
-    /// Whether a face was created, and whether its texture is torn.
+    /// The array `rebuilt`: whether a face was created, and whether its texture is torn.
     pub rebuilt: bool,
 }
 
 impl Surface {
     /// The mesh of a scene; `None` if it has no such table.
     pub(super) fn of(values: &Values) -> Option<Self> {
-        let (own, output) = (values.table("surface"), values.table("output"));
+        let (keys, output) = (values.table("surface"), values.table("output"));
         Some(Self {
-            particles: own.find("particles")?,
-            mesh: own.find("mesh"),
-            resculpt: own.find("resculpt"),
-            space: own.space(),
-            offset: own.get("offset"),
-            speed: own.get("speed"),
-            spacing: own.find("spacing"),
-            cell: own.get("cell"),
-            change: own.get("change"),
-            rebuild: own.get("rebuild"),
-            every: own.text("match") == Some("every"),
-            min_drop: own.get("min_drop"),
-            ahead: own.get("ahead"),
-            weighting: match own.text("weighting") {
+            particles: keys.find("particles")?,
+            mesh: keys.find("mesh"),
+            resculpt: keys.find("resculpt"),
+            space: keys.space(),
+            offset: keys.get("offset"),
+            speed: keys.get("speed"),
+            spacing: keys.find("spacing"),
+            cell: keys.get("cell"),
+            change: keys.get("change"),
+            rebuild: keys.get("rebuild"),
+            every: keys.text("match") == Some("every"),
+            min_drop: keys.get("min_drop"),
+            ahead: keys.get("ahead"),
+            weighting: match keys.text("weighting") {
                 Some("mean") => Weighting::Mean,
                 _ => Weighting::Affine,
             },
-            half_life: own.find("half_life"),
-            fade: own.get("fade"),
+            half_life: keys.find("half_life"),
+            fade: keys.get("fade"),
             output: Files {
                 ply: output.holds("surface", "ply"),
                 obj: output.holds("surface", "obj"),
@@ -127,7 +127,7 @@ impl Surface {
     pub(super) fn time(&self, shot: Frames, frame: i32) -> f64 {
         let passed = f64::from(frame) - f64::from(shot.first);
         let time = f64::from(shot.first) - self.offset + self.speed * passed;
-        // A rounding error would read one more file.
+        // Without this a rounding error would make one more file be read.
         let whole = time.round();
         if (time - whole).abs() < 1e-6 { whole } else { time }
     }

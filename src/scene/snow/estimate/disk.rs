@@ -6,7 +6,7 @@ use crate::scene::snow::keys::volumes::Needs;
 use crate::scene::snow::stages::grain_files::WHOLE_EVERY;
 use crate::scene::{BaseMode, Scene};
 
-/// Bytes of a whole base file for each column of cells, and of the changes and removed snow of a frame.
+/// Bytes of a whole base file for each column of cells; bytes of a frame's changes and removed snow.
 const BYTES_PER_COLUMN: f64 = 20.0;
 const BYTES_PER_CHANGE: f64 = 4e5;
 /// Bytes of a whole base file for each leaf: two surfaces cross 3.2 leaves of 64 columns.
@@ -14,11 +14,11 @@ const BYTES_PER_LEAF: f64 = BYTES_PER_COLUMN * 64.0 / 3.2;
 /// Bytes for each vertex of an object in a .usda and a .ply file.
 const USDA_PER_VERTEX: f64 = 110.0;
 const PLY_PER_VERTEX: f64 = 50.0;
-/// Bytes of texture coordinates, and of a corner's index into them.
+/// Bytes of a pair of texture coordinates, and of a corner's index of one.
 const USDA_PER_POSITION: f64 = 20.0;
 const USDA_PER_INDEX: f64 = 7.0;
 const PLY_PER_POSITION: f64 = 8.0;
-/// Bytes of a grain in each kind of file (for changes: while a character walks), and in a packed state.
+/// Bytes of a grain in each kind of file, and in a packed state; for files of changes measured while a character walks.
 const GRAIN_VDB: f64 = 49.0;
 const GRAIN_CHANGES: f64 = 28.0;
 const GRAIN_PLY: f64 = 50.0;
@@ -27,7 +27,7 @@ const GRAIN_STATE: f64 = 90.0;
 /// Bytes of a grain in a fog and in a united surface.
 const GRAIN_FOG: f64 = 190.0;
 const GRAIN_UNITED: f64 = 60.0;
-/// Size of the density of the base, as a fraction of a whole base file.
+/// Size of the base as fog, as a fraction of a whole base file.
 const FOG_SHARE: f64 = 0.3;
 /// Bytes for each column of cells in a mesh of the base.
 const MESH_PLY: f64 = 90.0;
@@ -35,8 +35,8 @@ const MESH_USDA: f64 = 180.0;
 /// Number of states of grains that are kept.
 const STATES: f64 = 2.0;
 
-/// Estimates the disk space of grains' files and states (bytes); `there` has their count after each frame.
-pub(in crate::scene::snow) fn of_grains(scene: &Scene, there: &[f64]) -> u64 {
+/// Estimates the disk space of grains' files and states (bytes), from the count of grains after each frame.
+pub(in crate::scene::snow) fn of_grains(scene: &Scene, counts: &[f64]) -> u64 {
     let output = scene.output;
     let vdb = |frame: usize| match output.grains_delta && !frame.is_multiple_of(WHOLE_EVERY as usize) {
         true => GRAIN_CHANGES,
@@ -49,9 +49,9 @@ pub(in crate::scene::snow) fn of_grains(scene: &Scene, there: &[f64]) -> u64 {
             + f64::from(output.volumes.fog_grains) * GRAIN_FOG
             + f64::from(output.volumes.snow) * GRAIN_UNITED
     };
-    let files: f64 = there.iter().enumerate().map(|(frame, grains)| grains * each(frame)).sum();
-    let most = there.iter().copied().fold(0.0, f64::max);
-    (files + STATES * most * GRAIN_STATE) as u64
+    let files: f64 = counts.iter().enumerate().map(|(frame, grains)| grains * each(frame)).sum();
+    let max = counts.iter().copied().fold(0.0, f64::max);
+    (files + STATES * max * GRAIN_STATE) as u64
 }
 
 /// Estimates the disk space of all files (bytes) except those of grains.

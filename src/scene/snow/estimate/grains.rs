@@ -11,8 +11,8 @@ use crate::scene::snow::Inputs;
 use crate::scene::snow::grain_params::params;
 use crate::snow::grains::PACKING;
 
-/// Relative error that an estimate of the grains may have.
-const OFF: f64 = 0.1;
+/// Relative error of an estimate of the count of grains.
+const ESTIMATE_ERROR: f64 = 0.1;
 
 /// Forecast of the grains from a base.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -21,15 +21,15 @@ pub struct Forecast {
     pub to_frame: i32,
     /// Snow removed after the first frame (m3).
     pub removed_m3: f64,
-    /// Share of it that does not become grains: the minimum over all objects that remove snow.
+    /// Share of that snow that does not become grains: the minimum over all objects that remove snow.
     pub compression: f64,
     /// Largest count of grains at one time.
     pub grains: u64,
-    /// Whether it is an upper bound: objects differ in `compression`, or a `keep_box` removes grains.
+    /// Whether `grains` is an upper bound: objects differ in `compression`, or a `keep_box` removes grains.
     pub at_most: bool,
     /// Memory of the stage (bytes).
     pub memory_bytes: u64,
-    /// Disk space of its files and states (bytes).
+    /// Disk space of the stage's files and states (bytes).
     pub disk_bytes: u64,
 }
 
@@ -54,17 +54,18 @@ impl Forecast {
             return Ok(None);
         }
         let params = params(scene, inputs.snow.cell);
-        let takers = scene.objects.iter().enumerate().filter(|(_, object)| object.role.removes());
-        let own = |index| scene.values.element(OBJECT, index).find("compression");
-        let all: Vec<f64> = takers.map(|(index, _)| own(index).unwrap_or(params.compression)).collect();
+        let removers = scene.objects.iter().enumerate().filter(|(_, object)| object.role.removes());
+        let compression_of = |index| scene.values.element(OBJECT, index).find("compression");
+        let all: Vec<f64> =
+            removers.map(|(index, _)| compression_of(index).unwrap_or(params.compression)).collect();
         let compression = all.iter().copied().reduce(f64::min).unwrap_or(params.compression);
         let grain = std::f64::consts::PI / 6.0 * (2.0 * params.radius).powi(3);
-        let of_snow = |volume: f64| volume * (1.0 - compression) * PACKING / grain;
-        let mut born: Vec<f64> = removed.iter().map(|volume| of_snow(*volume)).collect();
-        born[0] += inputs.drift.as_ref().map_or(0.0, |drift| drift.positions.len() as f64);
-        let frames = params.lifetime.map(|lifetime| (lifetime * scene.shot.fps).ceil() as usize);
-        let there = alive(&born, frames.unwrap_or(usize::MAX));
-        let grains = there.iter().copied().fold(0.0, f64::max).round() as u64;
+        let grains_of = |volume: f64| volume * (1.0 - compression) * PACKING / grain;
+        let mut born: Vec<f64> = removed.iter().map(|volume| grains_of(*volume)).collect();
+        born[0] += inputs.initial_grains.as_ref().map_or(0.0, |initial| initial.positions.len() as f64);
+        let lifetime = params.lifetime.map(|lifetime| (lifetime * scene.shot.fps).ceil() as usize);
+        let counts = alive(&born, lifetime.unwrap_or(usize::MAX));
+        let grains = counts.iter().copied().fold(0.0, f64::max).round() as u64;
         Ok(Some(Self {
             to_frame: first + (removed.len() - 1) as i32,
             removed_m3: removed.iter().sum(),
@@ -72,26 +73,26 @@ impl Forecast {
             grains,
             at_most: all.iter().any(|other| *other != compression) || params.keep_box.is_some(),
             memory_bytes: memory::of_grains(inputs, grains)?,
-            disk_bytes: disk::of_grains(scene, &there),
+            disk_bytes: disk::of_grains(scene, &counts),
         }))
     }
 
-    /// Fails if there are too many grains for the limits; if the forecast is an upper bound, that is only likely.
+    /// Fails if there would be too many grains, or if they would need too much memory. A forecast that is an upper bound may fail wrongly.
     ///
     /// # Errors
     /// More than `grains.max` by over a tenth, which exceeds the error of estimates; more memory than the limit (bytes).
     pub fn check(&self, scene: &Scene, limit: u64) -> Result<()> {
-        if self.grains as f64 > (1.0 + OFF) * most(scene) as f64 {
+        if self.grains as f64 > (1.0 + ESTIMATE_ERROR) * max_grains(scene) as f64 {
             return Err(Error::argument(self.too_many(scene)));
         }
         let what = || format!("{}: stage grains with {}", scene.path.display(), self.count());
         Error::check_memory(self.memory_bytes, limit, what)
     }
 
-    /// The warning for an estimate over `grains.max` by no more than its error.
+    /// The warning about an estimate that exceeds `grains.max` by no more than its error.
     pub fn warning(&self, scene: &Scene) -> Option<String> {
-        let (grains, most) = (self.grains, most(scene));
-        let is_close = grains > most && grains as f64 <= (1.0 + OFF) * most as f64;
+        let (grains, max) = (self.grains, max_grains(scene));
+        let is_close = grains > max && grains as f64 <= (1.0 + ESTIMATE_ERROR) * max as f64;
         is_close.then(|| self.too_many(scene))
     }
 
@@ -102,7 +103,7 @@ impl Forecast {
             scene.path.display(),
             self.to_frame,
             self.count(),
-            most(scene)
+            max_grains(scene)
         )
     }
 
@@ -113,13 +114,13 @@ impl Forecast {
 }
 
 /// The maximum number of grains of a scene.
-fn most(scene: &Scene) -> u64 {
+fn max_grains(scene: &Scene) -> u64 {
     scene.values.table("grains").get("max")
 }
 
 /// Count of grains after each frame, given those born in each and their lifetime in frames.
-fn alive(born: &[f64], frames: usize) -> Vec<f64> {
-    let from = |frame: usize| (frame + 1).saturating_sub(frames);
+fn alive(born: &[f64], lifetime: usize) -> Vec<f64> {
+    let from = |frame: usize| (frame + 1).saturating_sub(lifetime);
     (0..born.len()).map(|frame| born[from(frame)..=frame].iter().sum()).collect()
 }
 

@@ -1,4 +1,4 @@
-//! Memory of a scene, estimated before any is allocated.
+//! Estimates a scene's memory before it is allocated.
 
 use crate::error::{Error, Result};
 use crate::scene::snow::grain_params::params;
@@ -8,18 +8,18 @@ use crate::scene::{BaseMode, Layer, Scene};
 use crate::snow;
 use crate::vdb::file;
 
-/// Bytes for each column of cells: two surfaces, each across two leaves, and the work to make them.
+/// Bytes for each column of cells: two surfaces, each across two leaves, and temporary data while they are made.
 const BYTES_PER_COLUMN: f64 = 260.0;
 /// Bytes for each triangle that moves: its poses, and its sweep in a frame.
 const BYTES_PER_TRIANGLE: f64 = 2000.0;
 /// Bytes for each grain besides those of a step: a copy of the grains that is written while the next frame is made, their points and files.
-const BYTES_PER_WRITTEN: u64 = 400;
+const BYTES_PER_GRAIN: u64 = 400;
 /// Bytes for each column of cells in a mesh of the base, and in its files.
-const BYTES_OF_MESH: f64 = 500.0;
-/// Bytes for each grain as a point that was read, and in each kind of volume with its file.
-const BYTES_OF_POINT: u64 = 150;
-const BYTES_OF_FOG: u64 = 1200;
-const BYTES_OF_UNITED: u64 = 700;
+const BYTES_PER_MESH_COLUMN: f64 = 500.0;
+/// Bytes for each grain: as a point read from a file, and in each kind of volume with its file.
+const BYTES_PER_POINT: u64 = 150;
+const BYTES_PER_FOG_GRAIN: u64 = 1200;
+const BYTES_PER_UNITED_GRAIN: u64 = 700;
 /// Bytes that every run takes.
 const FIXED: f64 = 64e6;
 
@@ -32,10 +32,10 @@ pub fn estimate(scene: &Scene, inputs: &Inputs) -> Result<u64> {
     // Whole frames are written from a copy while the next one is made.
     let output = scene.output;
     let copies = if output.base_restarts() && output.base_mode == BaseMode::Delta { 1.0 } else { 2.0 };
-    let base = layer(inputs)? * copies + around(inputs);
-    let drift = inputs.drift.as_ref().map_or(0, |drift| drift.positions.len() as u64);
-    let grains = if has_grains(&scene.values) { of_grains(inputs, drift)? } else { 0 };
-    Ok(grains.max(base as u64).max(of_volumes(scene, inputs, drift)?))
+    let base = layer(inputs)? * copies + besides_layers(inputs);
+    let initial = inputs.initial_grains.as_ref().map_or(0, |initial| initial.positions.len() as u64);
+    let grains = if has_grains(&scene.values) { of_grains(inputs, initial)? } else { 0 };
+    Ok(grains.max(base as u64).max(of_volumes(scene, inputs, initial)?))
 }
 
 /// Estimates the memory (bytes) of the stage volumes with this many grains; 0 without that stage.
@@ -51,12 +51,12 @@ pub(in crate::scene::snow) fn of_volumes(scene: &Scene, inputs: &Inputs, grains:
     let base = f64::from(needs.base) * layer
         + f64::from(asked.fog_base) * layer
         + f64::from(asked.snow) * layer * fine * fine
-        + f64::from(asked.mesh()) * columns * BYTES_OF_MESH;
-    let each = u64::from(needs.grains) * BYTES_OF_POINT
-        + u64::from(asked.fog_grains) * BYTES_OF_FOG
-        + u64::from(needs.grains && asked.snow) * BYTES_OF_UNITED;
-    let there = needs.base || needs.grains;
-    Ok(if there { (base + FIXED) as u64 + grains * each } else { 0 })
+        + f64::from(asked.mesh()) * columns * BYTES_PER_MESH_COLUMN;
+    let each = u64::from(needs.grains) * BYTES_PER_POINT
+        + u64::from(asked.fog_grains) * BYTES_PER_FOG_GRAIN
+        + u64::from(needs.grains && asked.snow) * BYTES_PER_UNITED_GRAIN;
+    let has_volumes = needs.base || needs.grains;
+    Ok(if has_volumes { (base + FIXED) as u64 + grains * each } else { 0 })
 }
 
 /// Voxels of the united surface along the edge of a cell.
@@ -71,13 +71,13 @@ pub(in crate::scene::snow) fn division(scene: &Scene, inputs: &Inputs) -> usize 
 /// # Errors
 /// As [`estimate`].
 pub(in crate::scene::snow) fn of_grains(inputs: &Inputs, grains: u64) -> Result<u64> {
-    Ok((2.0 * layer(inputs)? + around(inputs)) as u64
+    Ok((2.0 * layer(inputs)? + besides_layers(inputs)) as u64
         + snow::grains::memory(grains as usize)
-        + grains * BYTES_PER_WRITTEN)
+        + grains * BYTES_PER_GRAIN)
 }
 
 /// Bytes of a run besides its layers.
-fn around(inputs: &Inputs) -> f64 {
+fn besides_layers(inputs: &Inputs) -> f64 {
     let triangles: usize = inputs.bodies.iter().map(|body| body.motion().triangles().len()).sum();
     triangles as f64 * BYTES_PER_TRIANGLE + FIXED
 }

@@ -1,6 +1,6 @@
-//! Forecast of the memory and disk space of mist. The cost of a cell of air is known; how far mist spreads is not, until it is made. So the
-//! count of cells is taken from the mist that a folder already holds, even if only of the shot's first frames or of coarser cells; without
-//! any, it is a rough estimate: the cells that fill the boxes of all objects, along their paths while mist lasts.
+//! Forecast of the memory and disk space of mist. The cost of a cell of air is known, but not how far mist will spread. So the count of
+//! cells is taken from mist that the output folder already holds, even if only of the shot's first frames or of coarser cells. Without any
+//! it is a rough estimate: the cells in the bounding boxes of all objects along their paths, for as long as mist lasts.
 
 use std::collections::HashMap;
 
@@ -16,22 +16,22 @@ use crate::scene::snow::keys::mist::mist_params;
 use crate::snow::mist::{self, MIN_DENSITY, Params};
 use crate::vdb::file;
 
-/// Cells along the edge of a tile, and in a tile. Air is computed in whole tiles, plus one more layer around those that hold mist.
+/// Cells along the edge of a tile, and in a tile. Air is simulated in whole tiles: those that hold mist and one layer around them.
 const EDGE: f64 = 8.0;
 const CELLS: u64 = 512;
 /// Bytes of a cell while a frame is written and the next one made: a copy of velocity, pressure and density with their neighbours (40);
 /// density and velocity as blocks, as grids and as a file (16 each).
-const WRITING: u64 = 40 + 3 * 16;
+const BYTES_WRITING: u64 = 40 + 3 * 16;
 /// Bytes of a cell in mist/ (density and velocity), and in fog/: 32-bit floats, which hardly compress.
-const IN_MIST: u64 = 16;
-const IN_FOG: u64 = 4;
+const BYTES_IN_MIST: u64 = 16;
+const BYTES_IN_FOG: u64 = 4;
 /// Bytes of a cell in an exact state, and number of states kept.
-const IN_STATE: u64 = 40;
+const BYTES_IN_STATE: u64 = 40;
 const STATES: u64 = 2;
-/// Maximum cubes counted in a box: larger boxes are counted in larger cubes.
-const COUNTED: f64 = 4096.0;
-/// Maximum moments of a shot at which boxes are counted: in longer shots several frames count as one.
-const MOMENTS: usize = 512;
+/// Maximum count of cubes (of one tile) in a box: for larger boxes the cubes are larger.
+const MAX_CUBES: f64 = 4096.0;
+/// Maximum count of intervals that a shot is divided into: in longer shots an interval has several frames.
+const MAX_INTERVALS: usize = 512;
 
 /// Estimated memory and disk of the mist stage.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -44,7 +44,7 @@ pub struct MistForecast {
     pub memory_bytes_per_cell: u64,
     /// Maximum disk space of each cell in the files of a frame (bytes).
     pub disk_bytes_per_cell: u64,
-    /// The last frame of existing mist, if the count of cells is from that; `None`: it is from the objects' boxes.
+    /// The last frame of existing mist, if the count of cells comes from it; `None` if it comes from the objects' boxes.
     pub made_to_frame: Option<i32>,
     /// Maximum cells at one time.
     pub cells: u64,
@@ -64,36 +64,36 @@ impl MistForecast {
     pub(in crate::scene::snow) fn of(
         ctx: &Context,
         scene: &Scene,
-        courses: &[ObjectPath],
+        paths: &[ObjectPath],
         stored: Option<&DoneFrames>,
     ) -> Result<Option<Self>> {
         let Some(params) = mist_params(&scene.values) else { return Ok(None) };
         let last = scene.shot.frames.last;
-        let made = stored.map(|stored| made(stored, params.cell, last)).transpose()?.flatten();
+        let existing = stored.map(|stored| existing_cells(stored, params.cell, last)).transpose()?.flatten();
         // The maximum number of cells at one time, and the sum over all frames.
-        let (most, all) = match made {
+        let (max, total) = match existing {
             Some((_, cells)) => (cells, cells * scene.shot.frames.count() as f64),
             None => {
-                let of_frames = in_boxes(ctx, scene, courses, &params)?;
+                let of_frames = cells_in_boxes(ctx, scene, paths, &params)?;
                 (of_frames.iter().copied().fold(0.0, f64::max), of_frames.iter().sum())
             }
         };
         let output = scene.output;
-        let in_mist = if output.mist { IN_MIST } else { 0 };
-        let in_fog = if output.volumes.fog_mist { IN_FOG } else { 0 };
+        let in_mist = if output.mist { BYTES_IN_MIST } else { 0 };
+        let in_fog = if output.volumes.fog_mist { BYTES_IN_FOG } else { 0 };
         let [step, in_files] = [mist::memory(1) / CELLS, in_mist + in_fog];
-        let cells = most.ceil() as u64;
+        let cells = max.ceil() as u64;
         Ok(Some(Self {
             cell_m: params.cell,
             step_bytes_per_cell: step,
-            memory_bytes_per_cell: step + WRITING,
+            memory_bytes_per_cell: step + BYTES_WRITING,
             disk_bytes_per_cell: in_files,
-            made_to_frame: made.map(|(frame, _)| frame),
+            made_to_frame: existing.map(|(frame, _)| frame),
             cells,
-            air_m3: most * params.cell.powi(3),
-            memory_bytes: cells.saturating_mul(step + WRITING),
-            disk_bytes: ((all * in_files as f64) as u64)
-                .saturating_add(cells.saturating_mul(STATES * IN_STATE)),
+            air_m3: max * params.cell.powi(3),
+            memory_bytes: cells.saturating_mul(step + BYTES_WRITING),
+            disk_bytes: ((total * in_files as f64) as u64)
+                .saturating_add(cells.saturating_mul(STATES * BYTES_IN_STATE)),
         }))
     }
 
@@ -111,8 +111,8 @@ impl MistForecast {
         })
     }
 
-    /// The maximum cells of a step under a memory limit (bytes).
-    pub fn most_cells(&self, limit: u64) -> u64 {
+    /// The maximum count of cells of a step within a memory limit (bytes).
+    pub fn max_cells(&self, limit: u64) -> u64 {
         limit / self.step_bytes_per_cell
     }
 }
@@ -122,62 +122,67 @@ fn rounded(length: f64) -> f64 {
     format!("{length:.2e}").parse().unwrap_or(length)
 }
 
-/// The last frame of existing mist, up to `last`, and the maximum cells of its frames, converted to cells of an edge `cell` (m); `None` if
-/// no mist was raised yet, or no file is left that states the size of its cells.
-fn made(stored: &DoneFrames, cell: f64, last: i32) -> Result<Option<(i32, f64)>> {
+/// The last frame, up to `last`, of existing mist, and the maximum count of cells in a frame, converted to cells of an edge `cell` (m).
+/// `None` if there was no mist yet, or if no file is left that has the size of its cells.
+fn existing_cells(stored: &DoneFrames, cell: f64, last: i32) -> Result<Option<(i32, f64)>> {
     let (mut end, mut counts) = (None, Vec::new());
     for frame in stored.frames().filter(|frame| *frame <= last) {
         let report = stored.report(frame)?;
         counts.extend(report.as_ref().and_then(|report| report.get("cells")?.as_f64()));
         end = Some(frame);
     }
-    let most = counts.iter().copied().fold(0.0, f64::max);
-    // No frame is left in which it might be raised.
-    if most == 0.0 && end == Some(last) && !counts.is_empty() {
+    let max = counts.iter().copied().fold(0.0, f64::max);
+    // The whole shot is done, and has no mist.
+    if max == 0.0 && end == Some(last) && !counts.is_empty() {
         return Ok(Some((last, 0.0)));
     }
-    let Some((end, (frame, _))) = end.zip(stored.files("mist").pop()).filter(|_| most > 0.0) else {
+    let Some((end, (frame, _))) = end.zip(stored.files("mist").pop()).filter(|_| max > 0.0) else {
         return Ok(None);
     };
     // A run with --preview has larger cells.
     let grids = file::describe(&stored.file(frame, "mist")?)?;
     let factor = grids.first().map_or(1.0, |grid| grid.voxel / cell);
-    Ok(Some((end, most * factor.powi(3))))
+    Ok(Some((end, max * factor.powi(3))))
 }
 
-/// The cells at each frame, if mist fills the boxes of all objects that push grains near the snow, from then until it has dissipated, and
+/// Count of cells at each frame, if mist fills the boxes of all objects that push grains near the snow, lasts until it has dissipated, and
 /// drifts with a uniform wind.
-fn in_boxes(ctx: &Context, scene: &Scene, courses: &[ObjectPath], params: &Params) -> Result<Vec<f64>> {
+fn cells_in_boxes(ctx: &Context, scene: &Scene, paths: &[ObjectPath], params: &Params) -> Result<Vec<f64>> {
     let (frames, fps) = (scene.shot.frames, scene.shot.fps);
     let count = frames.count();
-    let each = count.div_ceil(MOMENTS).max(1);
-    // From full density to the density that counts as none.
-    let lasts = params.half_life * libm::log2(1.0 / f64::from(MIN_DENSITY)) * fps;
-    let lasts = (lasts.ceil() as usize).min(count);
+    let interval_length = count.div_ceil(MAX_INTERVALS).max(1);
+    // The time from full density to one that is negligible.
+    let lifetime = params.half_life * libm::log2(1.0 / f64::from(MIN_DENSITY)) * fps;
+    let lifetime = (lifetime.ceil() as usize).min(count);
     let tile = EDGE * params.cell;
-    let of_air = |(frame, [low, high]): (i32, [DVec3; 2])| {
-        // In the frame of reference of the air.
+    let interval_box = |(frame, [low, high]): (i32, [DVec3; 2])| {
+        // In a frame of reference that drifts with the wind.
         let drift = DVec3::from(params.wind) * (f64::from(frame) / fps);
         let margin = DVec3::repeat(tile);
-        ((frame - frames.first) as usize / each, [low - margin - drift, high + margin - drift])
+        ((frame - frames.first) as usize / interval_length, [low - margin - drift, high + margin - drift])
     };
-    let of_course = |course: &ObjectPath| joined(course.passing().map(of_air));
-    let mut boxes: Vec<(usize, [DVec3; 2])> = courses.iter().flat_map(of_course).collect();
+    let boxes_of = |path: &ObjectPath| united(path.boxes_near_snow().map(interval_box));
+    let mut boxes: Vec<(usize, [DVec3; 2])> = paths.iter().flat_map(boxes_of).collect();
     boxes.sort_by_key(|(at, _)| *at);
     let tiles = |[low, high]: &[DVec3; 2]| (high - low).iter().map(|side| side / tile).product::<f64>();
     let largest = boxes.iter().map(|(_, corners)| tiles(corners)).fold(0.0, f64::max);
-    let wide = libm::cbrt(largest / COUNTED).ceil().max(1.0);
-    let cubes = filled(ctx, &boxes, tile * wide, [count, lasts].map(|frames| frames.div_ceil(each)))?;
-    let cells = CELLS as f64 * wide.powi(3);
-    Ok((0..count).map(|at| cubes[at / each] as f64 * cells).collect())
+    let coarsening = libm::cbrt(largest / MAX_CUBES).ceil().max(1.0);
+    let cubes = filled_cubes(
+        ctx,
+        &boxes,
+        tile * coarsening,
+        [count, lifetime].map(|frames| frames.div_ceil(interval_length)),
+    )?;
+    let cells = CELLS as f64 * coarsening.powi(3);
+    Ok((0..count).map(|at| cubes[at / interval_length] as f64 * cells).collect())
 }
 
-/// The boxes of an object (m, ascending by moment), those of a moment united.
-fn joined(boxes: impl Iterator<Item = (usize, [DVec3; 2])>) -> Vec<(usize, [DVec3; 2])> {
+/// The boxes of an object (m, ascending by interval), united to one in each interval.
+fn united(boxes: impl Iterator<Item = (usize, [DVec3; 2])>) -> Vec<(usize, [DVec3; 2])> {
     let mut all: Vec<(usize, [DVec3; 2])> = Vec::new();
     for (at, [low, high]) in boxes {
         match all.last_mut() {
-            Some((moment, corners)) if *moment == at => {
+            Some((interval, corners)) if *interval == at => {
                 *corners = [corners[0].inf(&low), corners[1].sup(&high)];
             }
             _ => all.push((at, [low, high])),
@@ -186,17 +191,17 @@ fn joined(boxes: impl Iterator<Item = (usize, [DVec3; 2])>) -> Vec<(usize, [DVec
     all
 }
 
-/// Number of cubes of an edge (m) that are filled at each of `count` moments: those in any box (m, ascending by moment) of that moment or
-/// of the `lasts` moments before it.
-fn filled(
+/// Number of cubes with an edge of `edge` (m) that are filled in each of `count` intervals: those in any box (m, ascending by interval) of
+/// that interval or of the `lifetime` intervals before it.
+fn filled_cubes(
     ctx: &Context,
     boxes: &[(usize, [DVec3; 2])],
     edge: f64,
-    [count, lasts]: [usize; 2],
+    [count, lifetime]: [usize; 2],
 ) -> Result<Vec<i64>> {
-    // The moment when each was last in a box, and the change in their number at each moment.
+    // The last interval in which each cube was in a box, and the change of their number in each interval.
     let mut latest: HashMap<[i32; 3], usize> = HashMap::new();
-    let mut more = vec![0i64; count];
+    let mut change = vec![0i64; count];
     for (at, [low, high]) in boxes {
         ctx.check()?;
         let [first, last] =
@@ -204,22 +209,22 @@ fn filled(
         let on = move |axis: usize| first[axis]..=last[axis];
         for cube in on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z]))) {
             let before = latest.insert(cube, *at);
-            if before.is_some_and(|before| *at <= before + lasts) {
+            if before.is_some_and(|before| *at <= before + lifetime) {
                 continue;
             }
-            more[*at] += 1;
+            change[*at] += 1;
             if let Some(before) = before {
-                more[before + lasts + 1] -= 1;
+                change[before + lifetime + 1] -= 1;
             }
         }
     }
     for before in latest.into_values() {
-        if let Some(more) = more.get_mut(before + lasts + 1) {
-            *more -= 1;
+        if let Some(change) = change.get_mut(before + lifetime + 1) {
+            *change -= 1;
         }
     }
-    (1..count).for_each(|at| more[at] += more[at - 1]);
-    Ok(more)
+    (1..count).for_each(|at| change[at] += change[at - 1]);
+    Ok(change)
 }
 
 #[cfg(test)]
@@ -230,8 +235,8 @@ mod tests {
     #[test]
     fn boxes_of_a_moment_are_one_around_them() {
         let corner = |x: f64, z: f64| DVec3::new(x, 0.0, z);
-        let at = |moment: usize, x: f64| (moment, [corner(x, -x), corner(x + 1.0, 1.0 - x)]);
-        let one = joined([at(0, 0.0), at(0, 2.0), at(0, 1.0), at(1, 3.0), at(3, 4.0)].into_iter());
+        let at = |interval: usize, x: f64| (interval, [corner(x, -x), corner(x + 1.0, 1.0 - x)]);
+        let one = united([at(0, 0.0), at(0, 2.0), at(0, 1.0), at(1, 3.0), at(3, 4.0)].into_iter());
         let around = (0, [corner(0.0, -2.0), corner(3.0, 1.0)]);
         assert_eq!(one, [around, at(1, 3.0), at(3, 4.0)]);
     }
@@ -245,14 +250,15 @@ mod tests {
     fn cubes_are_filled_from_when_a_box_is_there_until_mist_is_gone() {
         let ctx = Context::new(Pool::new(1).unwrap());
         let at = |frame: usize, x: f64| (frame, [DVec3::new(x, 0.0, 0.0), DVec3::new(x + 1.5, 0.5, 0.5)]);
-        let filled =
-            |boxes: &[(usize, [DVec3; 2])], lasts: usize| filled(&ctx, boxes, 1.0, [8, lasts]).unwrap();
+        let filled_cubes = |boxes: &[(usize, [DVec3; 2])], lifetime: usize| {
+            filled_cubes(&ctx, boxes, 1.0, [8, lifetime]).unwrap()
+        };
         // Two cubes at once, for that frame and two more.
-        assert_eq!(filled(&[at(1, 0.0)], 2), [0, 2, 2, 2, 0, 0, 0, 0]);
+        assert_eq!(filled_cubes(&[at(1, 0.0)], 2), [0, 2, 2, 2, 0, 0, 0, 0]);
         // A box that moves by one cube a frame, and one that comes back after, or before, its cubes are empty again.
-        assert_eq!(filled(&[at(0, 0.0), at(1, 1.0), at(2, 2.0)], 1), [2, 3, 3, 2, 0, 0, 0, 0]);
-        assert_eq!(filled(&[at(0, 0.0), at(5, 0.0)], 2), [2, 2, 2, 0, 0, 2, 2, 2]);
-        assert_eq!(filled(&[at(0, 0.0), at(3, 0.0)], 2), [2, 2, 2, 2, 2, 2, 0, 0]);
-        assert_eq!(filled(&[at(0, 0.0), at(0, 0.0), at(2, 0.0)], 8), [2; 8]);
+        assert_eq!(filled_cubes(&[at(0, 0.0), at(1, 1.0), at(2, 2.0)], 1), [2, 3, 3, 2, 0, 0, 0, 0]);
+        assert_eq!(filled_cubes(&[at(0, 0.0), at(5, 0.0)], 2), [2, 2, 2, 0, 0, 2, 2, 2]);
+        assert_eq!(filled_cubes(&[at(0, 0.0), at(3, 0.0)], 2), [2, 2, 2, 2, 2, 2, 0, 0]);
+        assert_eq!(filled_cubes(&[at(0, 0.0), at(0, 0.0), at(2, 0.0)], 8), [2; 8]);
     }
 }

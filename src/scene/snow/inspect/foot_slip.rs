@@ -1,4 +1,4 @@
-//! Whether a character's feet stay where they stand: the speed of its clip against that of its keys.
+//! Foot sliding of a character: the walking speed of its clip compared with the speed at which its keys move it.
 
 use serde::Serialize;
 
@@ -7,38 +7,38 @@ use crate::geometry::DVec3;
 use crate::motion::{Character, Keys, Motion, Placed, Play, gait, is_gltf};
 use crate::scene::{Object, Scene};
 
-/// Feet that slip slower than this (m/s), or than this fraction of their clip's speed, are ignored.
-const SLOW: f64 = 0.05;
-const PART: f64 = 0.25;
+/// Slip slower than this (m/s), or than this fraction of the clip's speed, is ignored.
+const MIN_SLIP: f64 = 0.05;
+const MIN_SHARE: f64 = 0.25;
 
-/// How a clip must be carried, and how it is.
+/// The motion that a character's clip requires of its keys, and how much its feet slip with the keys of the scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Walk {
-    /// Velocity (m/s) that keeps standing parts in position, before any rotation by the keys.
+pub struct FootSlip {
+    /// Velocity (m/s) of the keys at which standing feet stay in position, before any rotation by the keys.
     pub carry_m_per_s: [f64; 3],
-    /// Distance covered in one cycle of the clip (m), and the duration of a cycle (s).
+    /// Distance covered in one cycle of the clip (m).
     pub stride_m: f64,
-    /// See [`Walk::stride_m`].
+    /// Duration of a cycle (s).
     pub round_s: f64,
-    /// Fraction of the time that something stands.
+    /// Fraction of the time in which some part stands still.
     pub standing: f64,
-    /// Speed (m/s) of standing parts when carried by the scene's keys.
+    /// Speed (m/s) at which standing feet slip with the scene's keys.
     pub slips_m_per_s: f64,
-    /// Keys that carry it correctly, straight on from the scene's first key.
+    /// Keys without slip, straight on from the scene's first key.
     pub keys: String,
     /// Whether the feet slip enough to report.
     pub slips: bool,
 }
 
-/// Analyses a character's clip; `None` if it has none, or stands nowhere for long, or too unevenly.
+/// Analyses a character's clip; `None` if it has none, or if no part stands still for long enough, or not steadily enough.
 ///
 /// # Errors
 /// As [`Character::open`].
-pub(in crate::scene::snow) fn walk(
+pub(in crate::scene::snow) fn foot_slip(
     scene: &Scene,
     object: &Object,
     moved: &dyn Motion,
-) -> Result<Option<Walk>> {
+) -> Result<Option<FootSlip>> {
     if !is_gltf(&object.file) {
         return Ok(None);
     }
@@ -52,25 +52,25 @@ pub(in crate::scene::snow) fn walk(
     let end = (start + round).min(scene.shot.time(frames.last));
     let Some(carried) = gait(moved, start, end)? else { return Ok(None) };
     let (speed, slips) = (own.velocity.norm(), carried.velocity.norm());
-    Ok(Some(Walk {
+    Ok(Some(FootSlip {
         carry_m_per_s: own.carry().into(),
         stride_m: speed * round,
         round_s: round,
         standing: own.standing,
         slips_m_per_s: slips,
         keys: keys(scene, object, own.carry())?,
-        slips: slips > SLOW && slips > PART * speed,
+        slips: slips > MIN_SLIP && slips > MIN_SHARE * speed,
     }))
 }
 
-/// Keys at the first and last frame that carry a figure at a velocity (m/s, before the first key's rotation).
+/// Keys at the first and last frame that move a character at a velocity (m/s, before the first key's rotation).
 fn keys(scene: &Scene, object: &Object, carry: DVec3) -> Result<String> {
     let (frames, fps) = (scene.shot.frames, scene.shot.fps);
     let first = object.keys.first();
     let (at, turn) = first.map_or(([0.0; 3], [0.0; 3]), |key| (key.at, key.turn_deg));
-    let turned =
+    let first_key =
         crate::motion::Key { time: 0.0, at: DVec3::zeros(), turn: DVec3::from(turn.map(f64::to_radians)) };
-    let (rotation, _) = Keys::new(vec![turned])?.at(0.0);
+    let (rotation, _) = Keys::new(vec![first_key])?.at(0.0);
     let seconds = (f64::from(frames.last) - f64::from(frames.first)) / fps;
     let last = DVec3::from(at) + rotation * carry * seconds;
     let key = |frame: i32, at: DVec3| {

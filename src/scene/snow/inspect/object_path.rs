@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::foot_slip::{Walk, walk};
+use super::foot_slip::{FootSlip, foot_slip};
 use super::relief::Relief;
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -16,14 +16,15 @@ use crate::snow::base_layer::Reach;
 use crate::snow::grains::FASTEST_OBJECT;
 use crate::sweep::{Body, REACH};
 
-/// Frames that one task poses in sequence.
-const RUN: usize = 12;
-/// Maximum rotation of a body between two samples of its path (radians), and maximum samples between two of its kinks.
-const TURN: f64 = std::f64::consts::PI / 6.0;
-const MOST_PARTS: f64 = 1000.0;
-/// An object larger than the first or smaller than the second (m) probably uses another unit.
-const TALL: f64 = 20.0;
-const SMALL: f64 = 0.02;
+/// Number of consecutive frames that one task poses.
+const BATCH: usize = 12;
+/// Maximum rotation (radians) of a body between two samples of its path.
+const MAX_ROTATION: f64 = std::f64::consts::PI / 6.0;
+/// Maximum count of samples between two breaks of its motion.
+const MAX_SAMPLES: f64 = 1000.0;
+/// An object larger or smaller than these sizes (m) probably uses another unit.
+const LARGEST: f64 = 20.0;
+const SMALLEST: f64 = 0.02;
 
 /// The path of a moving object.
 pub struct ObjectPath<'a> {
@@ -33,7 +34,7 @@ pub struct ObjectPath<'a> {
     name: String,
     object: &'a Object,
     body: &'a Body,
-    /// By frame.
+    /// At each frame of the shot.
     extents: Vec<Extent>,
 }
 
@@ -86,7 +87,7 @@ impl<'a> ObjectPath<'a> {
             fastest_frame: fastest.frame,
             touches: self.touches(),
             deepest: relief.and_then(|relief| self.deepest(relief)),
-            walk: walk(self.scene, self.object, self.body.motion())?,
+            walk: foot_slip(self.scene, self.object, self.body.motion())?,
         })
     }
 
@@ -97,7 +98,7 @@ impl<'a> ObjectPath<'a> {
     pub fn warnings(&self, ctx: &Context, report: &ObjectReport) -> Result<Vec<String>> {
         let all = [
             self.out_of_reach(ctx)?,
-            self.too_fast(),
+            self.rotates_too_far(),
             self.jumping(report),
             self.other_unit(),
             self.untouched(report),
@@ -132,7 +133,7 @@ impl<'a> ObjectPath<'a> {
 
     /// Minimum and maximum corner (m) at each frame from the first to the last at which its bounds overlap those of the snow; none for an
     /// object that pushes no grains.
-    pub fn passing(&self) -> impl Iterator<Item = (i32, [DVec3; 2])> {
+    pub fn boxes_near_snow(&self) -> impl Iterator<Item = (i32, [DVec3; 2])> {
         let touches = self.touches().filter(|_| self.object.role.pushes());
         let is_near = move |frame: i32| touches.is_some_and(|[first, last]| (first..=last).contains(&frame));
         let near = self.extents.iter().filter(move |extent| is_near(extent.frame));
@@ -157,16 +158,16 @@ impl<'a> ObjectPath<'a> {
         self.extents.iter().filter_map(of).min_by(|a, b| a.above_ground_m.total_cmp(&b.above_ground_m))
     }
 
-    /// The first frame that cannot be made because a body that touches the snow extends too far from it.
+    /// The first frame that cannot be simulated, because a body that touches the snow extends too far from it.
     fn out_of_reach(&self, ctx: &Context) -> Result<Option<String>> {
         let Self { scene, inputs, body, extents, .. } = self;
         let Some((low, high)) = inputs.bounds() else { return Ok(None) };
         let (middle, cell) = (0.5 * (low + high), inputs.snow.cell);
         // The centre of the actual snow, known only once it is made, may differ.
-        let near = (0.5 * REACH * cell).min(REACH * cell - (high - low).norm());
+        let limit = (0.5 * REACH * cell).min(REACH * cell - (high - low).norm());
         let is_far = |extent: &Extent| {
             let far = (extent.low - middle).abs().sup(&(extent.high - middle).abs()).max();
-            far + extent.moved > near
+            far + extent.moved > limit
         };
         let reach = Reach::of_snow(cell, low, high)?;
         let time = |frame: i32| scene.shot.time(frame);
@@ -183,8 +184,8 @@ impl<'a> ObjectPath<'a> {
         Ok(None)
     }
 
-    /// The first frame in which a body rotates too far for one step.
-    fn too_fast(&self) -> Option<String> {
+    /// The first frame in which the body rotates too far for one step.
+    fn rotates_too_far(&self) -> Option<String> {
         let shot = self.scene.shot;
         shot.frames.iter().skip(1).find_map(|frame| {
             let error = self.body.turning(shot.time(frame - 1), shot.time(frame)).err()?;
@@ -192,7 +193,7 @@ impl<'a> ObjectPath<'a> {
         })
     }
 
-    /// A step so fast that it is probably a jump.
+    /// The fastest step, if it is probably a jump.
     fn jumping(&self, report: &ObjectReport) -> Option<String> {
         (report.fastest_m_per_s > FASTEST_OBJECT).then(|| {
             format!(
@@ -203,14 +204,14 @@ impl<'a> ObjectPath<'a> {
         })
     }
 
-    /// A size that suggests another unit.
+    /// The size, if it suggests another unit.
     fn other_unit(&self) -> Option<String> {
         let tallest = (self.extents[0].high - self.extents[0].low).max();
         let scale = self.object.space.scale * likely_scale(tallest)?;
         Some(format!("{} is {tallest:.3} m large: scale = {scale}?", self.name))
     }
 
-    /// On which side of the snow it stays.
+    /// That it never touches the snow, and on which side it stays.
     fn untouched(&self, report: &ObjectReport) -> Option<String> {
         let (area, top) = self.inputs.area().zip(self.inputs.top()).filter(|_| report.touches.is_none())?;
         let (low, _) = self.bounds();
@@ -246,7 +247,7 @@ impl<'a> ObjectPath<'a> {
         ))
     }
 
-    /// Feet that slip.
+    /// Feet that slip too fast.
     fn slipping(&self, report: &ObjectReport) -> Option<String> {
         let walk = report.walk.as_ref().filter(|walk| walk.slips)?;
         Some(format!(
@@ -262,40 +263,40 @@ impl<'a> ObjectPath<'a> {
 /// Poses a body at every frame.
 fn extents(ctx: &Context, scene: &Scene, body: &Body) -> Result<Vec<Extent>> {
     let frames: Vec<i32> = scene.shot.frames.iter().collect();
-    let of_run = |run: &[i32]| -> Result<Vec<Extent>> {
+    let of_batch = |batch: &[i32]| -> Result<Vec<Extent>> {
         let at = |frame: i32| scene.shot.time(frame);
         // The first frame of a run is compared with the frame before it, if the shot has one.
-        let mut time = at((run[0] - 1).max(scene.shot.frames.first));
+        let mut time = at((batch[0] - 1).max(scene.shot.frames.first));
         let mut poses = Poses::start(body.motion(), time)?;
-        let mut ways = vec![0.0; body.motion().vertex_count()];
-        let mut out = Vec::with_capacity(run.len());
-        for &frame in run {
-            ways.fill(0.0);
-            for moment in moments(body.motion(), time, at(frame)) {
+        let mut lengths = vec![0.0; body.motion().vertex_count()];
+        let mut out = Vec::with_capacity(batch.len());
+        for &frame in batch {
+            lengths.fill(0.0);
+            for moment in sample_times(body.motion(), time, at(frame)) {
                 ctx.check()?;
                 let (before, pose) = poses.go_to(moment)?;
-                let pairs = ways.iter_mut().zip(pose.iter().zip(before));
-                pairs.for_each(|(way, (p, q))| *way += (p - q).norm());
+                let pairs = lengths.iter_mut().zip(pose.iter().zip(before));
+                pairs.for_each(|(length, (p, q))| *length += (p - q).norm());
             }
             time = at(frame);
             let (low, high) = span(poses.now());
             let lower = |a: DVec3, b: &DVec3| if b.y < a.y { *b } else { a };
             let lowest = poses.now().iter().fold(DVec3::repeat(f64::INFINITY), lower);
-            let moved = ways.iter().copied().fold(0.0, f64::max);
+            let moved = lengths.iter().copied().fold(0.0, f64::max);
             out.push(Extent { frame, low, high, lowest, moved });
         }
         Ok(out)
     };
-    let runs: Vec<Vec<Extent>> = frames.par_chunks(RUN).map(of_run).collect::<Result<_>>()?;
-    Ok(runs.concat())
+    let batches: Vec<Vec<Extent>> = frames.par_chunks(BATCH).map(of_batch).collect::<Result<_>>()?;
+    Ok(batches.concat())
 }
 
-/// Sample times of a motion after `from` and up to `to` (s): its kinks, and between them as many as its rotation requires.
-fn moments(motion: &dyn Motion, from: f64, to: f64) -> Vec<f64> {
+/// Sample times of a motion after `from` and up to `to` (s): its breaks, and between them as many as its rotation requires.
+fn sample_times(motion: &dyn Motion, from: f64, to: f64) -> Vec<f64> {
     let mut out = Vec::new();
     let mut begin = from;
     for end in motion.breaks(from, to).into_iter().chain([to]) {
-        let parts = (motion.turning(begin, end) / TURN).ceil().clamp(1.0, MOST_PARTS);
+        let parts = (motion.turning(begin, end) / MAX_ROTATION).ceil().clamp(1.0, MAX_SAMPLES);
         out.extend((1..parts as usize).map(|part| begin + (end - begin) * part as f64 / parts));
         out.push(end);
         begin = end;
@@ -303,13 +304,12 @@ fn moments(motion: &dyn Motion, from: f64, to: f64) -> Vec<f64> {
     out
 }
 
-/// Scale factor suggested by a size (m) that is implausible in metres: a file in centimetres or millimetres, or in too large
-/// a unit.
+/// The scale factor that makes an implausible size (m) plausible, as of a file in centimetres or millimetres.
 fn likely_scale(size: f64) -> Option<f64> {
     let plausible = |factor: f64| (0.3..=5.0).contains(&(size * factor));
     match size {
-        size if size > TALL => [0.01, 0.001].into_iter().find(|factor| plausible(*factor)),
-        size if size < SMALL => [100.0, 1000.0].into_iter().find(|factor| plausible(*factor)),
+        size if size > LARGEST => [0.01, 0.001].into_iter().find(|factor| plausible(*factor)),
+        size if size < SMALLEST => [100.0, 1000.0].into_iter().find(|factor| plausible(*factor)),
         _ => None,
     }
 }
@@ -346,16 +346,16 @@ pub struct ObjectReport {
     pub size_m: [f64; 3],
     /// Minimum and maximum position over the shot (m).
     pub bounds_m: [[f64; 3]; 2],
-    /// Maximum speed of a vertex between two frames (m/s), and the frame that ends that step.
+    /// Maximum speed of a vertex between two frames (m/s).
     pub fastest_m_per_s: f64,
-    /// See [`ObjectReport::fastest_m_per_s`].
+    /// The later of these two frames.
     pub fastest_frame: i32,
     /// First and last frame at which its bounds touch the snow's.
     pub touches: Option<[i32; 2]>,
     /// Its depth, if the ground is known and the object comes over it.
     pub deepest: Option<Deepest>,
-    /// How its clip must be carried.
-    pub walk: Option<Walk>,
+    /// The speed that its clip requires of its keys, and the slip of its feet.
+    pub walk: Option<FootSlip>,
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Heights of the ground and of the snow's top, for `check`: what an object moves through.
+//! Heights of the ground and of the snow's top, with which `check` compares the path of an object.
 
 use crate::geometry::spatial::bvh::Bvh;
 use crate::geometry::{DVec3, TriMesh};
@@ -8,7 +8,6 @@ use crate::snow::base_layer::initial::{Cover, Ground};
 /// The ground and the snow on it, as far as heights are known before the layer is made.
 pub(in crate::scene::snow) struct Relief {
     ground: Surface,
-    /// Depth of the snow above the ground (m), or its top.
     snow: Snow,
 }
 
@@ -18,6 +17,7 @@ enum Surface {
 }
 
 enum Snow {
+    /// Depth above the ground (m).
     Depth(f64),
     Top(Heights),
 }
@@ -25,6 +25,7 @@ enum Snow {
 /// Heights of a mesh seen from above.
 struct Heights {
     tree: Bvh,
+    /// Height from which rays are cast down (m).
     above: f64,
 }
 

@@ -7,12 +7,12 @@ use crate::scene::schema::{FAR, Table, Values, rounded};
 use crate::snow::{grain_cohesion, grain_friction};
 
 /// Maximum attraction (weights of a grain).
-const MOST_ATTRACTION: f64 = 1000.0;
+const MAX_ATTRACTION: f64 = 1000.0;
 
 const FIRST: Scopes = &[("grains", Scope::First)];
 const STEP: Scopes = &[("grains", Scope::Step)];
 
-/// All of them.
+/// The keys of grains.
 pub const GRAIN_KEYS: &[Key] = &[
     key(STEP, "grains", "preset", Choice(&["powder", "packed", "wet"]), optional("\"powder\""))
         .means("kind of snow: sets the defaults of the keys below"),
@@ -29,7 +29,7 @@ pub const GRAIN_KEYS: &[Key] = &[
         .means("height of the tallest wall of grains that stays up (m)"),
     key(STEP, "grains", "friction", Number(0.0, 1.0, ""), optional("0.2"))
         .means("between grains, instead of repose_angle_deg; grains do not rotate, so low values suffice"),
-    key(STEP, "grains", "attraction", Number(0.0, MOST_ATTRACTION, "weights of a grain"), optional("4.0"))
+    key(STEP, "grains", "attraction", Number(0.0, MAX_ATTRACTION, "weights of a grain"), optional("4.0"))
         .means("between grains that nearly touch, instead of stands"),
     key(STEP, "grains", "restitution", Number(0.0, 1.0, ""), or("0.0"))
         .means("share of their speed that grains keep when they bounce"),
@@ -69,17 +69,17 @@ pub const GRAIN_KEYS: &[Key] = &[
 /// # Errors
 /// A box without a volume.
 pub fn check_grains(table: &Table, values: &Values) -> Result<()> {
-    let own = values.table("grains");
-    if let Some([x0, y0, z0, x1, y1, z1]) = own.find::<[f64; 6]>("keep_box")
+    let grains = values.table("grains");
+    if let Some([x0, y0, z0, x1, y1, z1]) = grains.find::<[f64; 6]>("keep_box")
         && (x1 <= x0 || y1 <= y0 || z1 <= z0)
     {
         let what = "must be [x0, y0, z0, x1, y1, z1] with x0 < x1, y0 < y1 and z0 < z1";
         return Err(table.error("keep_box", what));
     }
-    let Some(radius) = own.find("radius") else { return Ok(()) };
-    if material(values, radius)[1] > MOST_ATTRACTION {
+    let Some(radius) = grains.find("radius") else { return Ok(()) };
+    if material(values, radius)[1] > MAX_ATTRACTION {
         let repose = repose_of(values);
-        let highest = grain_cohesion::wall_of(MOST_ATTRACTION, 2.0 * radius, repose);
+        let highest = grain_cohesion::wall_of(MAX_ATTRACTION, 2.0 * radius, repose);
         // Slightly less, so that the printed value is accepted.
         let highest = rounded(highest * (1.0 - 1.0e-4));
         let what = format!(
@@ -95,20 +95,20 @@ pub fn check_grains(table: &Table, values: &Values) -> Result<()> {
 /// Friction between grains of a radius (m), and their attraction (weights of a grain): as given, or derived from the angle of repose and
 /// the height of a wall.
 pub fn material(values: &Values, radius: f64) -> [f64; 2] {
-    let (own, repose) = (values.table("grains"), repose_of(values));
-    let of_wall = || grain_cohesion::of_wall(own.get("stands"), 2.0 * radius, repose);
-    let attraction = own.find("attraction").unwrap_or_else(of_wall);
+    let (grains, repose) = (values.table("grains"), repose_of(values));
+    let of_wall = || grain_cohesion::of_wall(grains.get("stands"), 2.0 * radius, repose);
+    let attraction = grains.find("attraction").unwrap_or_else(of_wall);
     let of_repose = || grain_friction::of_repose(repose, attraction > 0.0);
-    let friction = own.find("friction").unwrap_or_else(of_repose);
+    let friction = grains.find("friction").unwrap_or_else(of_repose);
     [friction, attraction]
 }
 
 /// The angle of repose (degrees): as given, or from the friction.
 fn repose_of(values: &Values) -> f64 {
-    let own = values.table("grains");
-    match own.find("friction") {
+    let grains = values.table("grains");
+    match grains.find("friction") {
         Some(friction) => grain_friction::repose_of(friction, true),
-        None => own.get("repose_angle_deg"),
+        None => grains.get("repose_angle_deg"),
     }
 }
 

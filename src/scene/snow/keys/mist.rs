@@ -10,7 +10,7 @@ use crate::snow::mist::{FASTEST_WIND, Params};
 const FIRST: Scopes = &[("mist", Scope::First)];
 const STEP: Scopes = &[("mist", Scope::Step)];
 
-/// All of them.
+/// The keys of mist.
 pub const MIST_KEYS: &[Key] = &[
     key(FIRST, "mist", "cell", Cells(0.25, 64.0), or_cells(4.0 / 3.0)).means("edge of a cell of air (m)"),
     key(STEP, "mist", "from_speed", Number(0.0, 1000.0, "m/s"), or("2.0"))
@@ -48,7 +48,10 @@ pub fn check_mist(table: &Table, values: &Values) -> Result<()> {
     params.validate().map_err(|error| match error {
         Error::Argument(what) => {
             let key = what.split(' ').next().unwrap_or_default();
-            let key = MIST_KEYS.iter().find(|declared| declared.name == key).map_or("cell", |key| key.name);
+            let key = MIST_KEYS
+                .iter()
+                .find(|declared_default| declared_default.name == key)
+                .map_or("cell", |key| key.name);
             table.error(key, what.strip_prefix(key).unwrap_or(&what).trim_start())
         }
         other => other,
@@ -57,20 +60,20 @@ pub fn check_mist(table: &Table, values: &Values) -> Result<()> {
 
 /// The parameters of a scene's mist; `None` if it has none. A wind given as a grid is not included.
 pub fn mist_params(values: &Values) -> Option<Params> {
-    let own = values.table("mist");
-    let defaults = Params::for_cell(own.find("cell")?);
+    let mist = values.table("mist");
+    let defaults = Params::for_cell(mist.find("cell")?);
     Some(Params {
-        from_speed: own.get("from_speed"),
-        falling: own.get("falling"),
-        gravity: own.get("gravity"),
-        half_life: own.get("half_life"),
-        wind: own.find("wind").unwrap_or_default(),
-        turbulence: own.get("turbulence"),
-        turbulence_size: own.find("turbulence_size").unwrap_or(defaults.turbulence_size),
-        confinement: own.get("confinement"),
-        noise: own.get("noise"),
-        noise_size: own.find("noise_size").unwrap_or(defaults.noise_size),
-        seed: own.get("seed"),
+        from_speed: mist.get("from_speed"),
+        falling: mist.get("falling"),
+        gravity: mist.get("gravity"),
+        half_life: mist.get("half_life"),
+        wind: mist.find("wind").unwrap_or_default(),
+        turbulence: mist.get("turbulence"),
+        turbulence_size: mist.find("turbulence_size").unwrap_or(defaults.turbulence_size),
+        confinement: mist.get("confinement"),
+        noise: mist.get("noise"),
+        noise_size: mist.find("noise_size").unwrap_or(defaults.noise_size),
+        seed: mist.get("seed"),
         ..defaults
     })
 }

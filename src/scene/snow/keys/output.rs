@@ -9,7 +9,7 @@ const MIST: Scopes = &[("mist", Scope::Output)];
 const VOLUMES: Scopes = &[("volumes", Scope::Output)];
 const OBJECTS: Scopes = &[("objects", Scope::Output)];
 
-/// All of them.
+/// The keys of output.
 pub const OUTPUT_KEYS: &[Key] = &[
     key(BASE, "output", "base", Choices(&["vdb"]), or("[\"vdb\"]"))
         .means("base/base.%04d.vdb: surface, compression, touched; [] = none"),

@@ -10,18 +10,18 @@ use crate::scene::{Ground, Layer, Snow};
 use crate::snow::NoiseParams;
 use std::path::PathBuf;
 
-/// Grains fall on the ground too, and mist flows along it.
+/// All stages depend on the ground: grains fall on it, and mist flows along it.
 const GROUND: Scopes = &[("base", Scope::First), ("grains", Scope::First), ("mist", Scope::First)];
 
-/// Edges of voxels (m).
-const CELLS: (f64, f64) = (1.0e-5, 10.0);
-/// A mesh of the top, or a level set of the whole layer.
-const TOPS: &[&str] = &["vdb", EXTENSIONS[0], EXTENSIONS[1], EXTENSIONS[2]];
+/// Range of the edge of a voxel (m).
+const CELL_RANGE: (f64, f64) = (1.0e-5, 10.0);
+/// Extensions of `top`: a mesh of the top surface, or a level set of the whole layer.
+const TOP_EXTENSIONS: &[&str] = &["vdb", EXTENSIONS[0], EXTENSIONS[1], EXTENSIONS[2]];
 
 const FIRST: Scopes = &[("base", Scope::First)];
 const STEP: Scopes = &[("base", Scope::Step)];
 
-/// All of them.
+/// The keys of snow.
 pub const KEYS: &[Key] = &[
     key(GROUND, "snow", "ground", HeightOrFile(FAR, &EXTENSIONS), optional("0.0").shown()).means(
         "height of a level plane (m), or a mesh (then no area); beside a .vdb layer only grains lie on it",
@@ -30,11 +30,11 @@ pub const KEYS: &[Key] = &[
         .means("extent of the plane: x0, z0, x1, z1 (m)"),
     key(FIRST, "snow", "depth", Number(1.0e-4, 1000.0, "m"), optional("0.3").shown())
         .means("depth above ground and static objects (m)"),
-    key(FIRST, "snow", "top", File(TOPS), optional("\"snow_top.ply\""))
+    key(FIRST, "snow", "top", File(TOP_EXTENSIONS), optional("\"snow_top.ply\""))
         .means("instead of depth: mesh of the top surface, or the layer as a level set"),
     key(GROUND, "snow", "origin", ORIGIN, or(NO_ORIGIN))
         .means("position that becomes the origin of the meshes of ground and top (m), subtracted in 64 bits"),
-    key(FIRST, "snow", "cell", Number(CELLS.0, CELLS.1, "m"), required("0.0075").shown())
+    key(FIRST, "snow", "cell", Number(CELL_RANGE.0, CELL_RANGE.1, "m"), required("0.0075").shown())
         .means("edge of a voxel (m)"),
     key(STEP, "snow", "min_crumb", Whole(0, 10_000), or("0"))
         .means("islands of fewer voxels are removed; 0 = off"),
@@ -52,16 +52,16 @@ pub const KEYS: &[Key] = &[
 impl Snow {
     /// The layer that a scene's values describe; `None` if it has no snow.
     pub(in crate::scene) fn of(values: &Values) -> Option<Self> {
-        let own = values.table("snow");
-        let cell = own.find("cell")?;
-        let layer = match (own.find("depth"), own.find::<PathBuf>("top")) {
+        let snow = values.table("snow");
+        let cell = snow.find("cell")?;
+        let layer = match (snow.find("depth"), snow.find::<PathBuf>("top")) {
             (Some(depth), _) => Layer::Depth(depth),
             (None, Some(top)) if extension(&top) == "vdb" => Layer::Grid(top),
             (None, top) => Layer::Top(top?),
         };
-        let plane = own.find("ground").map(|height| Ground::Plane { height, area: own.find("area") });
-        let ground = plane.or_else(|| own.find("ground").map(Ground::Mesh));
-        let (origin, min_crumb) = (own.get("origin"), own.get("min_crumb"));
+        let plane = snow.find("ground").map(|height| Ground::Plane { height, area: snow.find("area") });
+        let ground = plane.or_else(|| snow.find("ground").map(Ground::Mesh));
+        let (origin, min_crumb) = (snow.get("origin"), snow.get("min_crumb"));
         Some(Self { ground, layer, origin, cell, noise: noise(values)?, min_crumb })
     }
 
@@ -69,40 +69,40 @@ impl Snow {
     ///
     /// # Errors
     /// Keys that exclude each other, or a key without one that it needs; noise that would leave islands.
-    pub(in crate::scene) fn check(snow: &Table, values: &Values) -> Result<()> {
-        let own = values.table("snow");
-        let (ground, top) = (own.value("ground"), own.value("top"));
-        match (own.value("depth"), top) {
-            (Some(_), Some(_)) => return Err(snow.error("top", "excludes `depth`: give one of them")),
-            (None, None) => return Err(snow.error("depth", "is missing (or `top`, a mesh or .vdb file)")),
+    pub(in crate::scene) fn check(table: &Table, values: &Values) -> Result<()> {
+        let snow = values.table("snow");
+        let (ground, top) = (snow.value("ground"), snow.value("top"));
+        match (snow.value("depth"), top) {
+            (Some(_), Some(_)) => return Err(table.error("top", "excludes `depth`: give one of them")),
+            (None, None) => return Err(table.error("depth", "is missing (or `top`, a mesh or .vdb file)")),
             _ => {}
         }
         let is_grid = top.and_then(Value::path).is_some_and(|path| extension(path) == "vdb");
         let is_mesh = ground.and_then(Value::path).is_some() || !is_grid && top.is_some();
-        if own.get::<[f64; 3]>("origin") != [0.0; 3] && !is_mesh {
-            return Err(snow.error("origin", "is for meshes of ground and top: leave it out"));
+        if snow.get::<[f64; 3]>("origin") != [0.0; 3] && !is_mesh {
+            return Err(table.error("origin", "is for meshes of ground and top: leave it out"));
         }
-        match (ground, own.value("area")) {
+        match (ground, snow.value("area")) {
             (_, Some(_)) if is_grid => {
-                return Err(snow.error("area", "is of no use beside a .vdb layer in `top`: leave it out"));
+                return Err(table.error("area", "is of no use beside a .vdb layer in `top`: leave it out"));
             }
-            (None, Some(_)) => return Err(snow.error("area", "needs `ground`, the height of a plane")),
+            (None, Some(_)) => return Err(table.error("area", "needs `ground`, the height of a plane")),
             (Some(Value::File(_)), Some(_)) => {
-                return Err(snow.error("area", "is of no use beside a mesh in `ground`: leave it out"));
+                return Err(table.error("area", "is of no use beside a mesh in `ground`: leave it out"));
             }
             (Some(Value::Number(_)), None) if !is_grid => {
-                return Err(snow.error("area", "is missing: a plane needs [x0, z0, x1, z1] (m)"));
+                return Err(table.error("area", "is missing: a plane needs [x0, z0, x1, z1] (m)"));
             }
             (Some(_), Some(_)) => {
-                let [x0, z0, x1, z1] = own.find::<[f64; 4]>("area").unwrap_or_default();
+                let [x0, z0, x1, z1] = snow.find::<[f64; 4]>("area").unwrap_or_default();
                 if x1 <= x0 || z1 <= z0 {
-                    return Err(snow.error("area", "must be [x0, z0, x1, z1] with x0 < x1 and z0 < z1"));
+                    return Err(table.error("area", "must be [x0, z0, x1, z1] with x0 < x1 and z0 < z1"));
                 }
             }
             _ => {}
         }
         if !is_grid && ground.is_none() {
-            return Err(snow.error("ground", "is missing"));
+            return Err(table.error("ground", "is missing"));
         }
         Ok(())
     }
@@ -113,12 +113,12 @@ impl Snow {
     /// Noise that would leave islands.
     pub(in crate::scene) fn check_noise(table: &Table, values: &Values) -> Result<()> {
         let Some(noise) = noise(values) else { return Ok(()) };
-        let most = noise.max_amplitude();
-        if noise.amplitude <= most {
+        let max_amplitude = noise.max_amplitude();
+        if noise.amplitude <= max_amplitude {
             return Ok(());
         }
         let what = format!(
-            "is too steep, {} m over {} m, and would leave islands: an amplitude of at most {most:.4} m goes with this size",
+            "is too steep, {} m over {} m, and would leave islands: an amplitude of at most {max_amplitude:.4} m goes with this size",
             noise.amplitude, noise.size
         );
         Err(table.error(if table.has("amplitude") { "amplitude" } else { "size" }, what))
@@ -137,7 +137,7 @@ impl Snow {
             return Err(format!("a preview needs other cells than those of {}", path.display()));
         }
         let cell = self.cell * factor;
-        if !(CELLS.0..=CELLS.1).contains(&cell) {
+        if !(CELL_RANGE.0..=CELL_RANGE.1).contains(&cell) {
             return Err(format!("a preview would have cells of {cell} m"));
         }
         let mut noise = self.noise;
@@ -160,11 +160,11 @@ impl Snow {
 }
 
 fn noise(values: &Values) -> Option<NoiseParams> {
-    let own = values.table("snow.noise");
+    let noise = values.table("snow.noise");
     Some(NoiseParams {
-        amplitude: own.find("amplitude")?,
-        size: own.find("size")?,
-        octaves: own.get("octaves"),
-        seed: own.get("seed"),
+        amplitude: noise.find("amplitude")?,
+        size: noise.find("size")?,
+        octaves: noise.get("octaves"),
+        seed: noise.get("seed"),
     })
 }

@@ -24,11 +24,11 @@ pub struct Base<'a> {
     pub inputs: &'a Inputs,
 }
 
-/// Input of the writer.
+/// The changes of a step, to be written.
 pub struct Step {
     frame: i32,
     changes: Changes,
-    /// The base's file, if it is a whole one and the writer has no copy of the layer.
+    /// The contents of the base's file, if they are a whole layer of which the writer has no copy.
     whole: Option<Vec<u8>>,
 }
 
@@ -37,13 +37,13 @@ pub struct Writer {
     /// Provides the threads. Its cancel flag is ignored: a frame that was begun is finished.
     ctx: Context,
     half_width: f32,
-    /// The layer after the last step, if whole grids are written.
+    /// The layer after the last step, if whole layers are written.
     copy: Option<Grids>,
 }
 
 impl Base<'_> {
-    /// Whether writing needs a copy of the layer.
-    fn copies(&self) -> bool {
+    /// Whether the writer keeps a copy of the layer.
+    fn keeps_copy(&self) -> bool {
         !self.scene.output.base_restarts() || self.scene.output.base_mode == BaseMode::Full
     }
 
@@ -108,7 +108,7 @@ impl Stage for Base<'_> {
         (output.base && output.base_mode == BaseMode::Delta).then_some("base_mode = \"delta\"")
     }
 
-    /// A base stored as changes is left out: its files are not whole volumes.
+    /// A base stored as changes is left out, as renderers need whole layers.
     fn volumes(&self) -> Vec<Volume> {
         const BASE: &[Field] = &[
             Field::of("surface", Holds::Distance),
@@ -139,7 +139,7 @@ impl Stepping for Base<'_> {
         })?;
         let mut layer = match after {
             None => BaseLayer::new(ctx, initial, params)?,
-            Some(frame) => BaseLayer::resume(ctx, initial, frames::grids(ctx, done, frame)?, params)?,
+            Some(frame) => BaseLayer::resume(ctx, initial, frames::layer_at(ctx, done, frame)?, params)?,
         };
         layer.set_min_crumb(self.inputs.snow.min_crumb);
         log::info!(
@@ -155,7 +155,7 @@ impl Stepping for Base<'_> {
     fn step(&self, ctx: &Context, layer: &mut BaseLayer, to: &StepTarget<'_>) -> Result<Stepped<Step>> {
         let frame = to.frame;
         let time = |frame: i32| f64::from(frame) / self.scene.shot.fps;
-        // The first frame cuts out the first poses; nothing has moved yet.
+        // At the first frame the objects are cut out where they stand: they have not moved yet.
         let from = if self.is_first(frame) { frame } else { frame - 1 };
         let moving = self.scene.objects.iter().filter(|object| object.role.moves());
         let removing = self.inputs.bodies.iter().zip(moving).filter(|(_, object)| object.role.removes());
@@ -167,7 +167,7 @@ impl Stepping for Base<'_> {
         let changes = layer.take_changes()?;
         // The whole file at the first frame of a cache of changes needs no copy of the layer.
         let whole = match to.made_from {
-            Some(made_from) if self.scene.output.base && self.is_first(frame) && !self.copies() => {
+            Some(made_from) if self.scene.output.base && self.is_first(frame) && !self.keeps_copy() => {
                 Some(vdb_bytes(self.scene, frame, &layer.grids().list(), made_from)?)
             }
             _ => None,
@@ -176,7 +176,7 @@ impl Stepping for Base<'_> {
     }
 
     fn writer(&self, ctx: &Context, layer: &BaseLayer) -> Result<Writer> {
-        let copy = if self.copies() { Some(layer.grids().deep_copy()?) } else { None };
+        let copy = if self.keeps_copy() { Some(layer.grids().deep_copy()?) } else { None };
         Ok(Writer { ctx: Context::new(ctx.pool().clone()), half_width: layer.half_width(), copy })
     }
 

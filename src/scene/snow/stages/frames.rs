@@ -10,18 +10,18 @@ use crate::vdb::file;
 ///
 /// # Errors
 /// A missing frame; a file that is not what was written.
-pub(in crate::scene::snow) fn grids(ctx: &Context, done: &DoneFrames, frame: i32) -> Result<Grids> {
+pub(in crate::scene::snow) fn layer_at(ctx: &Context, done: &DoneFrames, frame: i32) -> Result<Grids> {
     let mut frames = done.frames_of_state(frame)?;
     let whole = frames.next().unwrap_or(frame);
     let mut grids = read_grids(done, whole)?;
     for later in frames {
-        follow(ctx, done, &mut grids, later)?;
+        apply_changes(ctx, done, &mut grids, later)?;
     }
     Ok(grids)
 }
 
-/// Updates a layer from the frame before to a frame that stores its changes.
-pub(in crate::scene::snow) fn follow(
+/// Applies the changes that a frame stores to the layer of the frame before.
+pub(in crate::scene::snow) fn apply_changes(
     ctx: &Context,
     done: &DoneFrames,
     grids: &mut Grids,
@@ -39,25 +39,25 @@ fn read_grids(done: &DoneFrames, frame: i32) -> Result<Grids> {
 /// Reads base layers frame by frame, and keeps the last one, so that the next frame reads only its changes.
 #[derive(Default)]
 pub struct LayerReader {
-    /// The layer after a frame.
-    at: Option<(i32, Grids)>,
+    /// The frame that was read last, and the layer after it.
+    last: Option<(i32, Grids)>,
 }
 
 impl LayerReader {
     /// The layer after a frame. Frames in ascending order cost one file each; skipped frames that store changes are read too.
     ///
     /// # Errors
-    /// As [`grids`].
+    /// As [`layer_at`].
     pub fn after(&mut self, ctx: &Context, done: &DoneFrames, frame: i32) -> Result<&Grids> {
         let follows =
             |before: i32| before <= frame && (before + 1..=frame).all(|between| done.keeps_changes(between));
-        let layer = match self.at.take() {
+        let layer = match self.last.take() {
             Some((before, mut layer)) if follows(before) => {
-                (before + 1..=frame).try_for_each(|next| follow(ctx, done, &mut layer, next))?;
+                (before + 1..=frame).try_for_each(|next| apply_changes(ctx, done, &mut layer, next))?;
                 layer
             }
-            _ => grids(ctx, done, frame)?,
+            _ => layer_at(ctx, done, frame)?,
         };
-        Ok(&self.at.insert((frame, layer)).1)
+        Ok(&self.last.insert((frame, layer)).1)
     }
 }

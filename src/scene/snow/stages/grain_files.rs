@@ -18,16 +18,16 @@ use crate::scene::vdb_metadata::metadata;
 use crate::vdb::file::{self, WriteOptions};
 use crate::vdb::{MetaValue, points};
 
-/// One frame in so many is complete.
+/// Interval (frames) of complete files.
 pub(in crate::scene::snow) const WHOLE_EVERY: i32 = 24;
 /// Metadata of a file of changes: the previous frame.
 const SINCE: &str = "frazil:changes_since";
 /// Metadata of a file of changes: the identities that are gone since then.
 const GONE: &str = "frazil:gone";
-/// Metadata of a file of changes: [`print_of`] the previous grains.
-const OF: &str = "frazil:changes_of";
-/// Upper bound of identities (exclusive).
-const MOST: i64 = 1 << 32;
+/// Metadata of a file of changes: [`hash_of`] the previous frame's grains.
+const BEFORE_HASH: &str = "frazil:changes_of";
+/// Identities are less than this.
+const ID_END: i64 = 1 << 32;
 
 /// The frame since which a .vdb file contains changes; none if it is complete.
 ///
@@ -59,17 +59,17 @@ pub(in crate::scene::snow) fn ordered(mut points: Points) -> Points {
         order.sort_unstable_by_key(|point| ids[*point as usize]);
         points.reorder(&order);
     }
-    let all_free =
+    let none_trapped =
         |values: &Values| matches!(values, Values::Bool(column) if !column.stored().contains(&true));
-    if points.attribute(TRAPPED).is_some_and(all_free) {
-        points.set(TRAPPED, FREE);
+    if points.attribute(TRAPPED).is_some_and(none_trapped) {
+        points.set(TRAPPED, NONE_TRAPPED);
     }
     points
 }
 
 /// Points whose attributes are either uniform in every frame or never, as the clips of a USD stage require.
 pub(in crate::scene::snow) fn for_clips(mut points: Points) -> Points {
-    if points.attribute(TRAPPED) == Some(&FREE) {
+    if points.attribute(TRAPPED) == Some(&NONE_TRAPPED) {
         points.set(TRAPPED, Values::Bool(Column::Each(vec![false; points.count()])));
     }
     points
@@ -77,7 +77,7 @@ pub(in crate::scene::snow) fn for_clips(mut points: Points) -> Points {
 
 /// The attribute of trapped grains, and its value if there are none.
 const TRAPPED: &str = "trapped";
-const FREE: Values = Values::Bool(Column::Uniform(false));
+const NONE_TRAPPED: Values = Values::Bool(Column::Uniform(false));
 
 fn ids(points: &Points) -> Vec<i64> {
     match points.attribute("id") {
@@ -103,8 +103,8 @@ pub(in crate::scene::snow) fn write(
         Some(before) => {
             let (changed, gone) = changes(before, points);
             metadata.push((SINCE.into(), MetaValue::Int(i64::from(files.frame) - 1)));
-            metadata.push((OF.into(), MetaValue::Text(print_of(before))));
-            metadata.push((GONE.into(), MetaValue::Text(listed(&runs(&gone)))));
+            metadata.push((BEFORE_HASH.into(), MetaValue::Text(hash_of(before))));
+            metadata.push((GONE.into(), MetaValue::Text(runs_to_text(&runs(&gone)))));
             bytes(&changed, metadata)?
         }
     };
@@ -115,7 +115,7 @@ pub(in crate::scene::snow) fn write(
 const NAME: &str = "grains";
 
 /// A hash of the identities and positions of grains in the order of [`ordered`].
-fn print_of(points: &Points) -> String {
+fn hash_of(points: &Points) -> String {
     let mut hash = Hasher::default();
     for id in ids(points) {
         hash.add(&id.to_le_bytes());
@@ -130,50 +130,54 @@ fn print_of(points: &Points) -> String {
 /// The points to store in a file of changes, and the identities that are gone.
 fn changes(before: &Points, after: &Points) -> (Points, Vec<i64>) {
     let (old, new) = (ids(before), ids(after));
-    let (mut picked, mut were, mut gone) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut picked, mut old_indices, mut gone) = (Vec::new(), Vec::new(), Vec::new());
     let mut at = 0;
     for (point, id) in new.iter().enumerate() {
         while at < old.len() && old[at] < *id {
             gone.push(old[at]);
             at += 1;
         }
-        let was = (at < old.len() && old[at] == *id).then_some(at);
-        at += usize::from(was.is_some());
-        if was.is_none_or(|was| !is_same(before, was, after, point)) {
+        let old_index = (at < old.len() && old[at] == *id).then_some(at);
+        at += usize::from(old_index.is_some());
+        if old_index.is_none_or(|old_index| !is_same(before, old_index, after, point)) {
             picked.push(point as u32);
-            were.push(was);
+            old_indices.push(old_index);
         }
     }
     gone.extend(&old[at..]);
     let mut changed = after.clone();
     changed.reorder(&picked);
-    of_birth(&mut changed, None, &were);
+    set_birth_attributes(&mut changed, None, &old_indices);
     (changed, gone)
 }
 
-/// Sets the attributes of birth of the points that existed before, each at an index: to their old values, or to 0, which
-/// compresses well.
-fn of_birth(points: &mut Points, before: Option<&Points>, were: &[Option<usize>]) {
-    fn taken<T: Copy + Default>(
+/// Sets the attributes of birth of points that existed before, at the given indices in `before`: to their values there or, without
+/// `before`, to 0, which compresses well.
+fn set_birth_attributes(points: &mut Points, before: Option<&Points>, old_indices: &[Option<usize>]) {
+    fn values_at_birth<T: Copy + Default>(
         own: &Column<T>,
         before: Option<&Column<T>>,
-        were: &[Option<usize>],
+        old_indices: &[Option<usize>],
     ) -> Column<T> {
-        let old = |was: usize| before.map_or(T::default(), |before| before.get(was));
+        let old = |old_index: usize| before.map_or(T::default(), |before| before.get(old_index));
         Column::Each(
-            were.iter().enumerate().map(|(point, was)| was.map_or_else(|| own.get(point), old)).collect(),
+            old_indices
+                .iter()
+                .enumerate()
+                .map(|(point, old_index)| old_index.map_or_else(|| own.get(point), old))
+                .collect(),
         )
     }
     for name in ["source_frame", "rest"] {
         let values = match (points.attribute(name), before.and_then(|before| before.attribute(name))) {
             (Some(Values::Int(own)), Some(Values::Int(before))) => {
-                Values::Int(taken(own, Some(before), were))
+                Values::Int(values_at_birth(own, Some(before), old_indices))
             }
-            (Some(Values::Int(own)), _) => Values::Int(taken(own, None, were)),
+            (Some(Values::Int(own)), _) => Values::Int(values_at_birth(own, None, old_indices)),
             (Some(Values::Vector(own)), Some(Values::Vector(before))) => {
-                Values::Vector(taken(own, Some(before), were))
+                Values::Vector(values_at_birth(own, Some(before), old_indices))
             }
-            (Some(Values::Vector(own)), _) => Values::Vector(taken(own, None, were)),
+            (Some(Values::Vector(own)), _) => Values::Vector(values_at_birth(own, None, old_indices)),
             _ => continue,
         };
         points.set(name, values);
@@ -181,35 +185,35 @@ fn of_birth(points: &mut Points, before: Option<&Points>, were: &[Option<usize>]
 }
 
 /// Whether a point is bitwise the same as before and not trapped.
-fn is_same(before: &Points, was: usize, after: &Points, point: usize) -> bool {
+fn is_same(before: &Points, old_index: usize, after: &Points, point: usize) -> bool {
     let bits = |vector: [f32; 3]| vector.map(f32::to_bits);
-    before.cells[was] == after.cells[point]
-        && bits(before.offsets[was]) == bits(after.offsets[point])
+    before.cells[old_index] == after.cells[point]
+        && bits(before.offsets[old_index]) == bits(after.offsets[point])
         && after.attributes.iter().all(|attribute| {
             match (before.attribute(&attribute.name), &attribute.values) {
                 (_, Values::Bool(now)) if attribute.name == TRAPPED => !now.get(point),
                 (Some(Values::Float(then)), Values::Float(now)) => {
-                    then.get(was).to_bits() == now.get(point).to_bits()
+                    then.get(old_index).to_bits() == now.get(point).to_bits()
                 }
                 (Some(Values::Vector(then)), Values::Vector(now)) => {
-                    bits(then.get(was)) == bits(now.get(point))
+                    bits(then.get(old_index)) == bits(now.get(point))
                 }
-                (Some(Values::Int(then)), Values::Int(now)) => then.get(was) == now.get(point),
-                (Some(Values::Long(then)), Values::Long(now)) => then.get(was) == now.get(point),
-                (Some(Values::Bool(then)), Values::Bool(now)) => then.get(was) == now.get(point),
+                (Some(Values::Int(then)), Values::Int(now)) => then.get(old_index) == now.get(point),
+                (Some(Values::Long(then)), Values::Long(now)) => then.get(old_index) == now.get(point),
+                (Some(Values::Bool(then)), Values::Bool(now)) => then.get(old_index) == now.get(point),
                 _ => false,
             }
         })
 }
 
-/// The points after a frame, from those before it and its changes.
+/// Applies a frame's changes to the points of the frame before.
 ///
 /// # Errors
-/// Changes of other points.
-fn follow(mut points: Points, mut changed: Points, gone: &[Run]) -> Result<Points> {
+/// Changes that belong to other points.
+fn apply_changes(mut points: Points, mut changed: Points, gone: &[Run]) -> Result<Points> {
     let (old, new) = (ids(&points), ids(&changed));
-    let were: Vec<Option<usize>> = new.iter().map(|id| old.binary_search(id).ok()).collect();
-    of_birth(&mut changed, Some(&points), &were);
+    let old_indices: Vec<Option<usize>> = new.iter().map(|id| old.binary_search(id).ok()).collect();
+    set_birth_attributes(&mut changed, Some(&points), &old_indices);
     let mut stays = vec![true; old.len()];
     for run in gone {
         let ends = [run.start(), run.end()].map(|id| old.binary_search(id));
@@ -219,20 +223,20 @@ fn follow(mut points: Points, mut changed: Points, gone: &[Run]) -> Result<Point
                 stays[low..=high].fill(false);
             }
             _ => {
-                let run = listed(std::slice::from_ref(run));
+                let run = runs_to_text(std::slice::from_ref(run));
                 return Err(Error::argument(format!("names grains as gone ({run}) that were not there")));
             }
         }
     }
-    for was in were.iter().flatten() {
-        if !std::mem::take(&mut stays[*was]) {
-            return Err(Error::argument(format!("names grain {} as gone, and holds it", old[*was])));
+    for old_index in old_indices.iter().flatten() {
+        if !std::mem::take(&mut stays[*old_index]) {
+            return Err(Error::argument(format!("names grain {} as gone, and holds it", old[*old_index])));
         }
     }
     let kept: Vec<u32> = (0..old.len() as u32).filter(|point| stays[*point as usize]).collect();
     points.reorder(&kept);
     if points.count() > 0 {
-        points.set(TRAPPED, FREE);
+        points.set(TRAPPED, NONE_TRAPPED);
     }
     points.append(changed).map_err(|_| Error::argument("holds grains with other attributes or voxels"))?;
     Ok(ordered(points))
@@ -241,8 +245,8 @@ fn follow(mut points: Points, mut changed: Points, gone: &[Run]) -> Result<Point
 /// Consecutive identities.
 type Run = RangeInclusive<i64>;
 
-/// The record of the previous grains in a frame's file: the identities that are gone, and [`print_of`] all of them, if present. `None` if
-/// the file is complete.
+/// What a file of changes says of the previous frame's grains: the identities that are gone, and the [`hash_of`] all grains if present.
+/// `None` if the file is complete.
 fn previous_record(
     frame: i32,
     metadata: &[(String, MetaValue)],
@@ -258,8 +262,8 @@ fn previous_record(
             _ => None,
         })
     };
-    let runs = text(GONE).and_then(|text| runs_of_text(text));
-    runs.map(|runs| Some((runs, text(OF).cloned())))
+    let runs = text(GONE).and_then(|text| runs_from_text(text));
+    runs.map(|runs| Some((runs, text(BEFORE_HASH).cloned())))
         .ok_or_else(|| Error::argument(format!("has no list of the grains that are gone ({GONE})")))
 }
 
@@ -269,7 +273,7 @@ fn runs(numbers: &[i64]) -> Vec<Run> {
 }
 
 /// Runs as a string: `3-7,12`.
-fn listed(runs: &[Run]) -> String {
+fn runs_to_text(runs: &[Run]) -> String {
     let run = |run: &Run| match (run.start(), run.end()) {
         (low, high) if low == high => low.to_string(),
         (low, high) => format!("{low}-{high}"),
@@ -277,14 +281,14 @@ fn listed(runs: &[Run]) -> String {
     runs.iter().map(run).collect::<Vec<_>>().join(",")
 }
 
-/// Reverses [`listed`]. The result stays runs: a short string may stand for four billion numbers.
-fn runs_of_text(text: &str) -> Option<Vec<Run>> {
+/// Reverses [`runs_to_text`]. The result stays runs: a short string may stand for four billion numbers.
+fn runs_from_text(text: &str) -> Option<Vec<Run>> {
     let mut out: Vec<Run> = Vec::new();
     for run in text.split(',').filter(|run| !run.is_empty()) {
         let (low, high) = run.split_once('-').unwrap_or((run, run));
         let (low, high) = (low.parse::<i64>().ok()?, high.parse::<i64>().ok()?);
-        if !(0..MOST).contains(&low)
-            || !(low..MOST).contains(&high)
+        if !(0..ID_END).contains(&low)
+            || !(low..ID_END).contains(&high)
             || out.last().is_some_and(|last| low <= *last.end())
         {
             return None;
@@ -297,7 +301,7 @@ fn runs_of_text(text: &str) -> Option<Vec<Run>> {
 /// Reads complete grains from a cache, frame by frame.
 pub struct RebuildGrains {
     stored: DoneFrames,
-    whole: Whole,
+    reader: GrainReader,
 }
 
 impl RebuildGrains {
@@ -306,7 +310,7 @@ impl RebuildGrains {
     /// # Errors
     /// As [`DoneFrames::read`].
     pub fn open(folder: &Path) -> Result<Self> {
-        Ok(Self { stored: DoneFrames::read(folder, NAME)?, whole: Whole::default() })
+        Ok(Self { stored: DoneFrames::read(folder, NAME)?, reader: GrainReader::default() })
     }
 
     /// The stored frames.
@@ -320,8 +324,9 @@ impl RebuildGrains {
     /// # Errors
     /// A frame that does not exist; a file that was changed since it was written; cancel.
     pub fn bytes(&mut self, ctx: &Context, frame: i32, options: &WriteOptions) -> Result<Vec<u8>> {
-        let (points, mut metadata) = self.whole.points(ctx, &self.stored, frame)?;
-        metadata.retain(|(key, _)| key.starts_with("frazil:") && ![SINCE, GONE, OF].contains(&&key[..]));
+        let (points, mut metadata) = self.reader.points(ctx, &self.stored, frame)?;
+        metadata
+            .retain(|(key, _)| key.starts_with("frazil:") && ![SINCE, GONE, BEFORE_HASH].contains(&&key[..]));
         points::to_bytes(ctx, NAME, points, &WriteOptions { metadata, ..options.clone() })
     }
 
@@ -330,20 +335,20 @@ impl RebuildGrains {
     /// # Errors
     /// As [`RebuildGrains::bytes`].
     pub fn points(&mut self, ctx: &Context, frame: i32) -> Result<&Points> {
-        Ok(self.whole.points(ctx, &self.stored, frame)?.0)
+        Ok(self.reader.points(ctx, &self.stored, frame)?.0)
     }
 }
 
-/// Complete grains, and the frame after which they are so.
+/// Reads complete grains frame by frame, and keeps the last ones, so that the next frame reads only its changes.
 #[derive(Default)]
-pub(in crate::scene::snow) struct Whole {
-    at: Option<(i32, Points)>,
+pub(in crate::scene::snow) struct GrainReader {
+    last: Option<(i32, Points)>,
 }
 
 /// Metadata of a file.
 type Metadata = Vec<(String, MetaValue)>;
 
-impl Whole {
+impl GrainReader {
     /// The grains after a frame, sorted by identity, with the metadata of its file. Frames in ascending order cost one file each.
     ///
     /// # Errors
@@ -352,11 +357,11 @@ impl Whole {
         let (mut later, mut metadata, mut at) = (Vec::new(), None, frame);
         let mut points = loop {
             ctx.check()?;
-            if let Some((_, points)) = self.at.take_if(|(there, _)| *there == at && at < frame) {
+            if let Some((_, points)) = self.last.take_if(|(last, _)| *last == at && at < frame) {
                 break points;
             }
             let (points, of_file) = read(stored, at)?;
-            let record = previous_record(at, &of_file).map_err(|error| wrong(stored, at, error))?;
+            let record = previous_record(at, &of_file).map_err(|error| in_frame(stored, at, error))?;
             metadata.get_or_insert(of_file);
             match record {
                 None => break points,
@@ -365,16 +370,16 @@ impl Whole {
             at -= 1;
         };
         for (at, changed, gone, of) in later.into_iter().rev() {
-            if of.is_some_and(|of| of != print_of(&points)) {
-                return Err(wrong(stored, at, Error::argument("holds changes of other grains")));
+            if of.is_some_and(|of| of != hash_of(&points)) {
+                return Err(in_frame(stored, at, Error::argument("holds changes of other grains")));
             }
-            points = follow(points, changed, &gone).map_err(|error| wrong(stored, at, error))?;
+            points = apply_changes(points, changed, &gone).map_err(|error| in_frame(stored, at, error))?;
         }
-        Ok((&self.at.insert((frame, points)).1, metadata.unwrap_or_default()))
+        Ok((&self.last.insert((frame, points)).1, metadata.unwrap_or_default()))
     }
 }
 
-fn wrong(stored: &DoneFrames, frame: i32, error: Error) -> Error {
+fn in_frame(stored: &DoneFrames, frame: i32, error: Error) -> Error {
     error.in_file_at(stored.folder(), format!("frame {frame} of grains "))
 }
 
@@ -441,8 +446,12 @@ mod tests {
                     assert_eq!(frames.get(point), if old.contains(&id) { 0 } else { id as i32 + 7 });
                 }
             }
-            let after =
-                follow(pair[0].clone(), changed, &runs_of_text(&listed(&runs(&gone))).unwrap()).unwrap();
+            let after = apply_changes(
+                pair[0].clone(),
+                changed,
+                &runs_from_text(&runs_to_text(&runs(&gone))).unwrap(),
+            )
+            .unwrap();
             assert_eq!(after.cells, pair[1].cells);
             assert_eq!(after.offsets, pair[1].offsets);
             assert!(after.count() == 0 || after.attributes == pair[1].attributes, "{after:?}");
@@ -455,20 +464,21 @@ mod tests {
             [(3, none()), (3, none()), (0, vec![0, 3]), (1, none()), (0, vec![1, 4]), (1, none())]
         );
         let there = || points(&[(1, 0.0, false), (2, 0.0, false), (4, 0.0, false)]);
-        for (held, gone) in [(&[][..], 3..=3), (&[], 2..=4), (&[], 1..=MOST - 1), (&[(2, 1.0, false)], 1..=2)]
+        for (held, gone) in
+            [(&[][..], 3..=3), (&[], 2..=4), (&[], 1..=ID_END - 1), (&[(2, 1.0, false)], 1..=2)]
         {
-            assert!(follow(there(), points(held), &[gone]).is_err());
+            assert!(apply_changes(there(), points(held), &[gone]).is_err());
         }
     }
 
     #[test]
     fn identities_are_listed_as_ranges() {
-        assert_eq!(listed(&runs(&[3, 4, 5, 6, 7, 12])), "3-7,12");
+        assert_eq!(runs_to_text(&runs(&[3, 4, 5, 6, 7, 12])), "3-7,12");
         for list in [vec![], vec![0], vec![1, 2], vec![0, 2, 3, 9, 100_000]] {
-            assert_eq!(runs_of_text(&listed(&runs(&list))), Some(runs(&list)));
+            assert_eq!(runs_from_text(&runs_to_text(&runs(&list))), Some(runs(&list)));
         }
         for wrong in ["x", "3-1", "-1", "5,4", "5,5", "1-5000000000000", "1-2-3"] {
-            assert_eq!(runs_of_text(wrong), None, "{wrong}");
+            assert_eq!(runs_from_text(wrong), None, "{wrong}");
         }
     }
 }

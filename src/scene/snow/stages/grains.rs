@@ -29,21 +29,21 @@ use crate::sweep::Body;
 pub struct Grains<'a> {
     scene: &'a Scene,
     inputs: &'a Inputs,
-    /// Moving objects as the grains see them.
+    /// The moving objects, with their parameters for grains.
     objects: Vec<Object<'a>>,
-    /// Data that does not move, made when a frame needs it.
-    still: OnceLock<Still<'a>>,
+    /// Built when a frame first needs it.
+    static_geometry: OnceLock<StaticGeometry<'a>>,
 }
 
-/// Data that does not move.
-struct Still<'a> {
+/// The ground and the static objects.
+struct StaticGeometry<'a> {
     /// The ground's mesh, and static objects that are solids.
     ground: Vec<Ground>,
     /// Other static objects.
     sheets: Vec<&'a TriMesh>,
 }
 
-impl<'a> Still<'a> {
+impl<'a> StaticGeometry<'a> {
     fn of(inputs: &'a Inputs) -> Self {
         let (solids, sheets): (Vec<_>, Vec<_>) =
             inputs.statics().iter().partition(|mesh| Ground::is_solid(mesh));
@@ -55,9 +55,9 @@ impl<'a> Still<'a> {
 /// State carried from frame to frame.
 pub struct State {
     grains: grains::Grains,
-    /// The base layer after a frame.
+    /// The last frame, and the base layer after it.
     layer: Option<(i32, Grids)>,
-    /// Whether it was logged that grains fell past the edge of the ground.
+    /// Whether the warning about grains that fell past the edge of the ground was logged.
     has_warned: bool,
 }
 
@@ -69,35 +69,35 @@ pub struct Writer {
     before: Option<Points>,
 }
 
-/// Grains that fall this far below the ground and the snow (m) are removed.
-const BELOW: f64 = 1.0;
+/// Depth (m) below the lowest point of ground and snow at which falling grains are removed.
+const FALL_DEPTH: f64 = 1.0;
 
 impl<'a> Grains<'a> {
     /// The stage for a scene.
     pub fn new(scene: &'a Scene, inputs: &'a Inputs) -> Self {
         let moving = scene.objects.iter().enumerate().filter(|(_, object)| object.role.moves());
         let object = |((index, object), body): ((usize, &scene::Object), &'a Body)| {
-            let own = scene.values.element(OBJECT, index);
+            let keys = scene.values.element(OBJECT, index);
             Object {
                 body,
-                friction: own.get("friction"),
-                stick: own.get("stick"),
-                compression: own.find("compression"),
+                friction: keys.get("friction"),
+                stick: keys.get("stick"),
+                compression: keys.find("compression"),
                 removes: object.role.removes(),
                 pushes: object.role.pushes(),
             }
         };
         let objects = moving.zip(&inputs.bodies).map(object).collect();
-        Self { scene, inputs, objects, still: OnceLock::new() }
+        Self { scene, inputs, objects, static_geometry: OnceLock::new() }
     }
 
-    /// Adds the grains that a file gives at the first frame, except those in the snow or below the ground; returns the frame's report.
-    fn begin(&self, ctx: &Context, grains: &mut grains::Grains, layer: &Grids) -> Result<Report> {
-        let Some(drift) = &self.inputs.drift else { return Ok(Report::default()) };
+    /// Adds the initial grains, except those in the snow or below the ground; returns the first frame's report.
+    fn emit_initial(&self, ctx: &Context, grains: &mut grains::Grains, layer: &Grids) -> Result<Report> {
+        let Some(initial) = &self.inputs.initial_grains else { return Ok(Report::default()) };
         let path = initial_grains::file(self.scene).unwrap_or(&self.scene.path);
         let frame = self.scene.shot.frames.first;
-        let all = drift.positions.len();
-        let (positions, velocities) = drift.outside(
+        let all = initial.positions.len();
+        let (positions, velocities) = initial.outside(
             ctx,
             (self.inputs.ground(), self.inputs.floor()),
             &layer.surface,
@@ -127,10 +127,10 @@ impl<'a> Grains<'a> {
         match before {
             Some(before) if stored.keeps_changes(frame) => {
                 let mut layer = before.deep_copy()?;
-                frames::follow(ctx, stored, &mut layer, frame)?;
+                frames::apply_changes(ctx, stored, &mut layer, frame)?;
                 Ok(layer)
             }
-            _ => frames::grids(ctx, stored, frame),
+            _ => frames::layer_at(ctx, stored, frame),
         }
     }
 
@@ -142,25 +142,26 @@ impl<'a> Grains<'a> {
         frame: i32,
     ) -> Result<StepReport> {
         let (floor, ground) = (self.inputs.floor(), self.inputs.ground());
-        let still = self.still.get_or_init(|| Still::of(self.inputs));
+        let static_geometry = self.static_geometry.get_or_init(|| StaticGeometry::of(self.inputs));
         let surface = &layers[1].surface;
-        let of_layer = surface.active_bbox().map_or(0.0, |(low, _)| f64::from(low[1]) * surface.voxel_size());
-        let of_ground = ground.and_then(|mesh| mesh.bounds()).map(|(low, _)| f64::from(low.y));
-        let bottom = [floor, of_ground].into_iter().flatten().fold(of_layer, f64::min);
+        let layer_bottom =
+            surface.active_bbox().map_or(0.0, |(low, _)| f64::from(low[1]) * surface.voxel_size());
+        let ground_bottom = ground.and_then(|mesh| mesh.bounds()).map(|(low, _)| f64::from(low.y));
+        let bottom = [floor, ground_bottom].into_iter().flatten().fold(layer_bottom, f64::min);
         let around = Surroundings {
             base: Base::Whole([&layers[0].surface, surface]),
             objects: &self.objects,
-            statics: &still.sheets,
-            ground: &still.ground,
+            statics: &static_geometry.sheets,
+            ground: &static_geometry.ground,
             floor,
-            lowest: bottom - BELOW,
+            lowest: bottom - FALL_DEPTH,
         };
         let time = |frame: i32| f64::from(frame) / self.scene.shot.fps;
         let step = state.grains.step(ctx, &around, [time(frame - 1), time(frame)], frame);
         let report = step.map_err(|error| error.in_file_at(&self.scene.path, "grains: "))?;
         if report.fell > 0 && !std::mem::replace(&mut state.has_warned, true) {
             log::warn!(
-                "frame {frame}: {} grains fell past the edge of the ground to {BELOW} m below it and are dropped, as are all that follow \
+                "frame {frame}: {} grains fell past the edge of the ground to {FALL_DEPTH} m below it and are dropped, as are all that follow \
                  them (`fell` in the reports): larger ground keeps them",
                 report.fell
             );
@@ -270,7 +271,7 @@ impl Stepping for Grains<'_> {
         let after = self.layer(ctx, stored, before.as_ref(), frame)?;
         let report = match &before {
             // Snow cut out by the first poses was removed before the shot began.
-            None => self.begin(ctx, &mut state.grains, &after)?,
+            None => self.emit_initial(ctx, &mut state.grains, &after)?,
             Some(before) => report_of(&self.move_grains(ctx, state, [before, &after], frame)?),
         };
         state.layer = Some((frame, after));

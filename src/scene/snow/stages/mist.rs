@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use super::frames::LayerReader;
-use super::grain_files::Whole;
+use super::grain_files::GrainReader;
 use super::settings;
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -42,11 +42,10 @@ pub struct State {
     mist: mist::Mist,
     /// Static objects, and the ground if it is a mesh.
     statics: Vec<Body>,
-    /// The grains after a frame.
-    grains: Whole,
-    /// Grains' positions and velocities after a frame: the one before the frame being made.
+    grains: GrainReader,
+    /// The previous frame, and the positions and velocities of its grains.
     starts: Option<(i32, Vec<(i64, Start)>)>,
-    /// The base layer after the frame before the one being made.
+    /// Reads the base layer after the previous frame.
     layer: LayerReader,
 }
 
@@ -68,7 +67,7 @@ impl Mist<'_> {
         error.in_file_at(&self.scene.path, "mist: ")
     }
 
-    /// The grains of a frame that may raise mist.
+    /// The grains that are fast enough in a frame to raise mist.
     fn sources(
         &self,
         ctx: &Context,
@@ -78,8 +77,8 @@ impl Mist<'_> {
     ) -> Result<Vec<Source>> {
         let of_frame =
             |frame: i32, error| Error::file(stored.folder(), format!("frame {frame} of grains {error}"));
-        let State { mist, grains, starts: known, .. } = state;
-        let starts = match known.take() {
+        let State { mist, grains, starts: cached, .. } = state;
+        let starts = match cached.take() {
             Some((at, starts)) if at == frame - 1 => starts,
             _ => {
                 let (before, _) = grains.points(ctx, stored, frame - 1)?;
@@ -89,7 +88,7 @@ impl Mist<'_> {
         let (points, _) = grains.points(ctx, stored, frame)?;
         let sources = sources_of(points, &starts, frame, mist.params());
         let sources = sources.map_err(|error| of_frame(frame, error))?;
-        *known = Some((frame, starts_of(points).map_err(|error| of_frame(frame, error))?));
+        *cached = Some((frame, starts_of(points).map_err(|error| of_frame(frame, error))?));
         Ok(sources)
     }
 
@@ -101,12 +100,12 @@ impl Mist<'_> {
         let frame = to.frame;
         let sources = self.sources(ctx, state, grains, frame)?;
         let raises = sources.iter().any(|source| source.raises(state.mist.params()));
-        // Air without mist is not computed, so that its obstacles do not matter.
+        // Air without mist is not simulated, so that obstacles have no effect.
         if !raises && state.mist.flow().tiles().active() == 0 {
             return Ok(StepReport::default());
         }
         let State { mist, statics, layer, .. } = state;
-        // Snow removed in this frame bounds the air until the objects reach it: see `Surroundings`.
+        // The layer before the frame: snow that objects remove in it bounds the air until they reach it, see `Surroundings`.
         let layer = layer.after(ctx, base, frame - 1)?;
         let moving = self.scene.objects.iter().filter(|object| object.role.moves());
         let pushing = self.inputs.bodies.iter().zip(moving).filter(|(_, object)| object.role.pushes());
@@ -153,7 +152,7 @@ fn attribute<'a>(points: &'a Points, name: &str) -> Result<&'a Values> {
     points.attribute(name).ok_or_else(|| Error::argument(format!("have no attribute {name}")))
 }
 
-/// Grains after a frame as sources of mist, with their positions before it; without those that are too slow.
+/// Grains after a frame as sources of mist, with their positions before it; grains that are too slow are left out.
 fn sources_of(points: &Points, starts: &[(i64, Start)], frame: i32, params: &Params) -> Result<Vec<Source>> {
     if points.count() == 0 {
         return Ok(Vec::new());
@@ -171,8 +170,7 @@ fn sources_of(points: &Points, starts: &[(i64, Start)], frame: i32, params: &Par
         return Err(Error::argument("have attributes of other types"));
     };
     let source = |point: usize| {
-        let known = starts.binary_search_by_key(&ids.get(point), |(id, _)| *id);
-        let start = match known {
+        let start = match starts.binary_search_by_key(&ids.get(point), |(id, _)| *id) {
             Ok(index) => Some(starts[index].1),
             // It was born in this frame, at rest.
             Err(_) if births.get(point) == frame => {
@@ -191,7 +189,7 @@ fn sources_of(points: &Points, starts: &[(i64, Start)], frame: i32, params: &Par
 }
 
 /// A mesh as a body at rest; `None` if it has no triangles.
-fn still(mesh: &TriMesh) -> Option<Result<Body>> {
+fn static_body(mesh: &TriMesh) -> Option<Result<Body>> {
     let body = || Body::new(Box::new(Rigid::new(mesh.clone(), Keys::default())), 0.0);
     (!mesh.triangles.is_empty()).then(body)
 }
@@ -255,8 +253,14 @@ impl Stepping for Mist<'_> {
             Some(frame) => done.resume(frame, |bytes| mist::Mist::resume(params, bytes))?,
         };
         let statics = self.inputs.statics().iter().chain(self.inputs.ground());
-        let statics = statics.filter_map(still).collect::<Result<_>>()?;
-        Ok(State { mist, statics, grains: Whole::default(), starts: None, layer: LayerReader::default() })
+        let statics = statics.filter_map(static_body).collect::<Result<_>>()?;
+        Ok(State {
+            mist,
+            statics,
+            grains: GrainReader::default(),
+            starts: None,
+            layer: LayerReader::default(),
+        })
     }
 
     fn step(&self, ctx: &Context, state: &mut State, to: &StepTarget<'_>) -> Result<Stepped<Self::Step>> {

@@ -1,4 +1,4 @@
-//! The settings of stages that depend on files of a scene with snow.
+//! Settings of the stages of a scene with snow, including hashes of the files that they depend on.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use crate::scene::run::{CONTENT, Settings};
 use crate::scene::schema::declaration::Key;
 use crate::scene::{Layer, Role, Scene};
 
-/// The settings that the base depends on. Of the frames only the first counts: a shot may be extended.
+/// The settings that the base depends on. Of the shot's frames only the first is one of them, as a shot may be extended.
 ///
 /// # Errors
 /// An input that cannot be read.
@@ -18,7 +18,7 @@ pub(in crate::scene::snow) fn of_base(scene: &Scene, input_hashes: &InputHashes)
     for (key, path) in scene.snow.iter().flat_map(|snow| snow.files()) {
         settings.insert(key.into(), format!("{CONTENT}{}", input_hashes.hash(path)?));
     }
-    // A given layer does not depend on what it lies on.
+    // A given layer does not depend on the ground below it.
     if scene.snow.as_ref().is_some_and(|snow| matches!(snow.layer, Layer::Grid(_))) {
         settings.remove("snow.ground");
     }
@@ -58,7 +58,7 @@ pub(in crate::scene::snow) fn of_layer(keys: &[Key], all: &Settings) -> Settings
             if key != "role" {
                 out.insert(format!("static object {}: {key}", position + 1), value.clone());
             }
-            // The start of a clip depends on it.
+            // The time at which a clip starts depends on the frame rate.
             if key == "clip" || key == "loop" {
                 out.extend(all.get("shot.fps").map(|fps| ("shot.fps".to_string(), fps.clone())));
             }
@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn static_objects_make_the_layer_wherever_they_stand() {
+    fn static_objects_count_whatever_their_index() {
         const ROLES: [(&str, &str); 2] = [("object[1].role", "\"static\""), ("object[3].role", "\"static\"")];
         let rock =
             |scale| of_layer(keys::of(System::Snow), &settings(&[ROLES[0], ("object[1].scale", scale)]));
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_makes_the_layer_is_of_the_layer() {
+    fn the_layer_depends_only_on_keys_of_its_first_frame() {
         let all = settings(&[("snow.depth", "0.3"), ("snow.min_crumb", "0"), ("output.half", "true")]);
         assert_eq!(of_layer(keys::of(System::Snow), &all).into_keys().collect::<Vec<_>>(), ["snow.depth"]);
     }

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use super::frames::LayerReader;
-use super::grain_files::Whole;
+use super::grain_files::GrainReader;
 use super::mist;
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -35,11 +35,11 @@ pub struct Volumes<'a> {
     needs: Needs,
 }
 
-/// Resumable from frame to frame only to read less.
+/// Readers, kept from frame to frame only so that less is read.
 #[derive(Default)]
 pub struct State {
     layer: LayerReader,
-    grains: Whole,
+    grains: GrainReader,
 }
 
 /// Inputs of a frame.
@@ -277,7 +277,7 @@ impl Stepping for Volumes<'_> {
 
     fn precheck(&self, ctx: &Context, upstream: &[DoneFrames], last: i32) -> Result<()> {
         let grains = match self.needs.grains {
-            true => most_grains(self.stored(upstream, "grains")?, last)?,
+            true => max_grains(self.stored(upstream, "grains")?, last)?,
             false => 0,
         };
         let needed = memory::of_volumes(self.scene, self.inputs, grains)?;
@@ -320,11 +320,11 @@ impl Stepping for Volumes<'_> {
 }
 
 /// The maximum count of grains after any frame up to `last`, from the existing reports.
-fn most_grains(grains: &DoneFrames, last: i32) -> Result<u64> {
-    let mut most = 0;
+fn max_grains(grains: &DoneFrames, last: i32) -> Result<u64> {
+    let mut max = 0;
     for frame in grains.frames().filter(|frame| *frame <= last) {
         let count = grains.report(frame)?.and_then(|report| report.get("grains")?.as_u64());
-        most = most.max(count.unwrap_or(0));
+        max = max.max(count.unwrap_or(0));
     }
-    Ok(most)
+    Ok(max)
 }

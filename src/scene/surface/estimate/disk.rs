@@ -6,12 +6,12 @@ use crate::scene::surface::Files;
 
 /// Bytes of a 32-bit float in text, with its separators.
 const TEXT: u64 = 12;
-/// Bytes around an index in text.
-const AROUND_INDEX: u64 = 2;
+/// Bytes of an index in text besides its digits.
+const INDEX_OVERHEAD: u64 = 2;
 /// Bytes of a vertex in the exact state: its position in 64 bits, the distance that it keeps, its flag. Positions hardly compress.
 const STATE_PER_VERTEX: u64 = 3 * 8 + 4 + 1;
-/// Additional bytes if the mesh is rebuilt: its displacement since a reference.
-const DRIFT_PER_VERTEX: u64 = 3 * 4;
+/// Additional bytes of a vertex if the mesh is rebuilt: its displacement since a reference.
+const DISPLACEMENT_PER_VERTEX: u64 = 3 * 4;
 /// Bytes of a frame's report and record; parts that the mesh does not cover, of which up to a hundred are listed, add to that.
 const RECORDS: u64 = 6000;
 
@@ -26,34 +26,34 @@ pub(in crate::scene::surface) struct FrameSize {
 }
 
 impl FrameSize {
-    /// Estimates the files of a mesh, which is rebuilt or not.
+    /// Estimates the files of a mesh with its data; `is_rebuilt`: whether it may be rebuilt.
     pub fn of(output: Files, is_rebuilt: bool, detail: &DetailedMesh) -> Self {
         let [vertices, triangles] = counts(detail);
-        let (positions, corners) = detail.uvs.as_ref().map_or((0, 0), |uvs| {
+        let (coordinates, corners) = detail.uvs.as_ref().map_or((0, 0), |uvs| {
             (uvs.coordinates.len() as u64, uvs.corners.as_ref().map_or(0, |corners| corners.len() as u64))
         });
-        let index = u64::from(vertices.max(positions).max(1).ilog10()) + 1 + AROUND_INDEX;
+        let index = u64::from(vertices.max(coordinates).max(1).ilog10()) + 1 + INDEX_OVERHEAD;
         // In .obj files every corner has an index of its texture coordinates, if there are any.
-        let named = if positions > 0 { 6 * triangles } else { 3 * triangles };
-        let obj = TEXT * (3 * vertices + 2 * positions) + index * named;
-        // Positions, velocities and arrays; each face also has its count of corners.
-        let own: usize = detail.arrays.iter().map(|array| array.values.len()).sum();
-        let if_asked = |is_asked: bool, bytes: u64| if is_asked { bytes } else { 0 };
-        let delta = if_asked(output.delta, vertices);
-        let flagged = if_asked(output.flagged, vertices);
-        let rebuilt = if_asked(output.rebuilt, triangles);
-        let usd = TEXT * (6 * vertices + 2 * positions + own as u64 + delta)
+        let indices = if coordinates > 0 { 6 * triangles } else { 3 * triangles };
+        let obj = TEXT * (3 * vertices + 2 * coordinates) + index * indices;
+        // Besides positions, velocities and arrays, .usda files have a count of corners for each face.
+        let array_values: usize = detail.arrays.iter().map(|array| array.values.len()).sum();
+        let if_written = |is_written: bool, bytes: u64| if is_written { bytes } else { 0 };
+        let delta = if_written(output.delta, vertices);
+        let flagged = if_written(output.flagged, vertices);
+        let rebuilt = if_written(output.rebuilt, triangles);
+        let usd = TEXT * (6 * vertices + 2 * coordinates + array_values as u64 + delta)
             + index * (3 * triangles + corners)
-            + (1 + AROUND_INDEX) * (triangles + flagged + rebuilt);
+            + (1 + INDEX_OVERHEAD) * (triangles + flagged + rebuilt);
         Self {
-            ply: if_asked(output.ply, ply(output, detail)),
-            obj: if_asked(output.obj, obj),
-            usd: if_asked(output.usd, usd),
-            state: (STATE_PER_VERTEX + if_asked(is_rebuilt, DRIFT_PER_VERTEX)) * vertices,
+            ply: if_written(output.ply, ply(output, detail)),
+            obj: if_written(output.obj, obj),
+            usd: if_written(output.usd, usd),
+            state: (STATE_PER_VERTEX + if_written(is_rebuilt, DISPLACEMENT_PER_VERTEX)) * vertices,
         }
     }
 
-    /// Bytes of the largest file except the state: they are written one after the other.
+    /// Bytes of the largest file except the state. Files are written one after the other, so only one is in memory.
     pub fn largest(&self) -> u64 {
         self.ply.max(self.obj).max(self.usd)
     }
@@ -74,18 +74,18 @@ fn ply(output: Files, detail: &DetailedMesh) -> u64 {
     let [vertices, triangles] = counts(detail);
     let attributes =
         12 * u64::from(output.velocities) + 4 * u64::from(output.delta) + u64::from(output.flagged);
-    let of_face = u64::from(output.rebuilt);
+    let face_attributes = u64::from(output.rebuilt);
     // Lists begin with a byte for their length: three indices, and with seams the six coordinates of corners.
     let uvs = detail.uvs.as_ref().map_or(0, |uvs| match uvs.corners {
         Some(_) => (1 + 6 * 4) * triangles,
         None => 2 * 4 * vertices,
     });
-    let own = |array: &MeshArray| {
+    let array_bytes = |array: &MeshArray| {
         let lists = if array.on == On::Corners { triangles } else { 0 };
         (array.values.len() * array.number.size()) as u64 + lists
     };
-    let own: u64 = detail.arrays.iter().map(own).sum();
-    (3 * 4 + attributes) * vertices + (1 + 3 * 4 + of_face) * triangles + uvs + own
+    let arrays: u64 = detail.arrays.iter().map(array_bytes).sum();
+    (3 * 4 + attributes) * vertices + (1 + 3 * 4 + face_attributes) * triangles + uvs + arrays
 }
 
 #[cfg(test)]
@@ -95,7 +95,7 @@ mod tests {
     use crate::io::mesh::{Carried, ply_bytes};
 
     #[test]
-    fn a_ply_file_is_as_large_as_said_but_for_its_header() {
+    fn a_ply_file_has_the_estimated_size_besides_its_header() {
         let mesh = TriMesh {
             positions: (0..4).map(|n| Vec3::repeat(n as f32)).collect(),
             triangles: vec![[0, 1, 2], [0, 2, 3]],

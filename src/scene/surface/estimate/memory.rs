@@ -1,6 +1,6 @@
-//! Memory of a mesh that follows a liquid, estimated before any is allocated.
+//! Estimates the memory of a mesh that follows a liquid before it is allocated.
 //!
-//! Bytes of each item, from the structures that hold it; lengths in spacings, r:
+//! Bytes of each item, from the structures that hold it; lengths in spacings, r (phi and Gamma: `surface/mod.rs`):
 //!
 //! | item | contents | bytes |
 //! |---|---|---|
@@ -41,15 +41,15 @@ use rayon::prelude::*;
 use super::disk::FrameSize;
 use crate::geometry::{DVec3, DetailedMesh};
 use crate::scene::surface::Surface;
-use crate::scene::surface::inputs::particle_times::KEPT;
+use crate::scene::surface::inputs::particle_times::CACHED_FILES;
 use crate::surface::Particles;
 
 /// Bytes that every run takes.
 const FIXED: f64 = 64e6;
 /// Bytes of a particle in each frame in memory: position, velocity, id.
 const PARTICLE: [f64; 3] = [24.0, 12.0, 8.0];
-/// Bytes of a particle's path in a step, and of the velocities at both ends of it.
-const WAY: [f64; 2] = [56.0, 48.0];
+/// Bytes of a particle's path in a step, and of the velocities at both its ends.
+const PATH: [f64; 2] = [56.0, 48.0];
 /// Bytes of a particle and of a node while the mesh is carried.
 const CARRYING: [f64; 2] = [104.0, 236.0];
 /// Bytes of a patch, of a vertex of the particles' surface, and of a block of distances.
@@ -62,7 +62,7 @@ const CARRIED: f64 = 8.0;
 /// If the mesh is rebuilt: bytes of a vertex and of a triangle of the mesh in each coming frame except the next.
 const COMING: [f64; 2] = [82.0, 32.0];
 /// Bytes of a particle's first position with its id, and of a triangle in a tree.
-const REST: f64 = 32.0;
+const FIRST_POSITION: f64 = 32.0;
 const TREE: f64 = 84.0;
 /// Bytes of a particle of the next frame, whose surface is made at the same time.
 const AHEAD: f64 = 68.0;
@@ -71,31 +71,31 @@ const CUT: [f64; 3] = [170.0, 98816.0, 680.0];
 /// Additional bytes of a vertex and of a triangle of the mesh.
 const REBUILT: [f64; 2] = [237.0, 150.0];
 /// Additional bytes of a number that the mesh carries, and of a vertex and of a triangle of a mesh that carries any.
-const CARRIED_ON: [f64; 3] = [32.0, 40.0, 164.0];
-/// Share of the mesh that does not match the liquid in a frame: as in a dam break while it splashes. More mismatch takes more memory.
-const UNFIT: f64 = 0.25;
+const REBUILT_CARRIED: [f64; 3] = [32.0, 40.0, 164.0];
+/// Share of the mesh that does not match the liquid in a frame: that of a splashing dam break. More takes more memory.
+const MISMATCH: f64 = 0.25;
 /// Blocks of Gamma for each face of a cell where the mesh does not match: its own, 8 cells wide, and one on each side.
-const GAMMA: f64 = 3.0 / 64.0;
+const BLOCKS_PER_FACE: f64 = 3.0 / 64.0;
 
-/// Particles from which a cube of two spacings counts as full; in a liquid it holds 8.
-const FULL: usize = 4;
+/// Count of particles from which a cube of two spacings is full; inside a liquid it has 8.
+const FULL_COUNT: usize = 4;
 /// Nodes of the grid of maps for each cube of the shell.
 const NODES: f64 = 4.0;
 /// Range of distances on each side (r): enough for detail of half a spacing.
 const REACH: f64 = 2.0;
 
-/// Maxima over the particles of all files.
+/// Maxima, over all particle files, of what the estimate depends on.
 #[derive(Debug, Default)]
-pub(in crate::scene::surface) struct Most {
+pub(in crate::scene::surface) struct MaxBytes {
     /// Bytes of a frame's particles.
     frame: f64,
     /// Bytes of their paths.
-    ways: f64,
-    /// Bytes of the work on them.
+    paths: f64,
+    /// Bytes of temporary data while they carry the mesh.
     work: f64,
-    /// Bytes of ids and positions that are kept, for textures.
-    rest: f64,
-    /// Bytes of their surface, made ahead.
+    /// Bytes of their ids and first positions, which are kept to trace textures.
+    first_positions: f64,
+    /// Bytes of their surface, computed one frame ahead.
     ahead: f64,
     /// Area of their surface (faces of cells).
     area: f64,
@@ -103,20 +103,20 @@ pub(in crate::scene::surface) struct Most {
     edge: f64,
 }
 
-impl Most {
+impl MaxBytes {
     /// Adds the particles of a file, with a spacing of `spacing` (m) and cells of `cell` (r).
     pub fn add(&mut self, particles: &Particles, spacing: f64, cell: f64) {
         let count = particles.positions.len() as f64;
         let (has_ids, has_velocities) = (!particles.ids.is_empty(), !particles.velocities.is_empty());
         let [position, velocity, id] = PARTICLE;
         let each = position + if has_velocities { velocity } else { 0.0 } + if has_ids { id } else { 0.0 };
-        let way = WAY[0] + if has_ids && has_velocities { WAY[1] } else { 0.0 };
+        let path = PATH[0] + if has_ids && has_velocities { PATH[1] } else { 0.0 };
         let shell = shell(&particles.positions, spacing) as f64;
         let [patches, vertices, _] = surface(shell, cell);
         self.frame = self.frame.max(count * each);
-        self.ways = self.ways.max(count * way);
+        self.paths = self.paths.max(count * path);
         self.work = self.work.max(work(count, shell, cell));
-        self.rest = self.rest.max(if has_ids { count * REST } else { 0.0 });
+        self.first_positions = self.first_positions.max(if has_ids { count * FIRST_POSITION } else { 0.0 });
         self.ahead = self.ahead.max(count * AHEAD + patches * SURFACE[0] + vertices * SURFACE[1]);
         self.area = self.area.max(vertices);
         self.edge = cell * spacing;
@@ -126,10 +126,11 @@ impl Most {
     pub fn estimate(&self, surface: &Surface, files: usize, detail: &DetailedMesh, frame: &FrameSize) -> u64 {
         let is_between = surface.speed.fract() != 0.0 || surface.offset.fract() != 0.0;
         // The particles of the first frame are kept; between two files both ends of a step are interpolated.
-        let held = files.min(KEPT) + 1 + if is_between { 2 } else { 0 };
-        let mesh = of_both(counts(detail), MESH) + numbers(detail) * CARRIED;
-        let particles = held as f64 * self.frame + self.ways + self.work;
-        let rebuilding = if surface.rebuild { self.rebuilding(detail, surface.looks() - 1) } else { 0.0 };
+        let frames = files.min(CACHED_FILES) + 1 + if is_between { 2 } else { 0 };
+        let mesh = mesh_bytes(counts(detail), MESH) + numbers(detail) * CARRIED;
+        let particles = frames as f64 * self.frame + self.paths + self.work;
+        let rebuilding =
+            if surface.rebuild { self.rebuilding(detail, surface.frames_ahead() - 1) } else { 0.0 };
         (FIXED + particles + mesh + rebuilding) as u64 + frame.largest()
     }
 
@@ -137,22 +138,22 @@ impl Most {
     ///
     /// The mesh grows with the particles' surface, by a vertex and two triangles for each face of a cell.
     fn rebuilding(&self, detail: &DetailedMesh, coming: i32) -> f64 {
-        let own = detail.mesh.area() / self.edge.powi(2);
-        let grown = (self.area - own).max(0.0);
+        let own_area = detail.mesh.area() / self.edge.powi(2);
+        let grown = (self.area - own_area).max(0.0);
         let [vertices, triangles] = counts(detail);
         let now = [vertices + grown, triangles + 2.0 * grown];
-        let mesh = of_both([grown, 2.0 * grown], MESH) + of_both(now, REBUILT);
-        let area = own.max(self.area);
+        let mesh = mesh_bytes([grown, 2.0 * grown], MESH) + mesh_bytes(now, REBUILT);
+        let area = own_area.max(self.area);
         let [faces, blocks, near] = CUT;
-        let changing = faces * area + UNFIT * (blocks * GAMMA * area + near * now[1]);
-        let ([number, vertex, triangle], count) = (CARRIED_ON, numbers(detail));
+        let changing = faces * area + MISMATCH * (blocks * BLOCKS_PER_FACE * area + near * now[1]);
+        let ([number, vertex, triangle], count) = (REBUILT_CARRIED, numbers(detail));
         let carrying = if count > 0.0 {
-            count * now[1] / triangles.max(1.0) * number + of_both(now, [vertex, triangle])
+            count * now[1] / triangles.max(1.0) * number + mesh_bytes(now, [vertex, triangle])
         } else {
             0.0
         };
-        let coming = f64::from(coming) * (of_both(now, COMING) + count * CARRIED);
-        let source = if count > 0.0 { self.rest + TREE * triangles } else { 0.0 };
+        let coming = f64::from(coming) * (mesh_bytes(now, COMING) + count * CARRIED);
+        let source = if count > 0.0 { self.first_positions + TREE * triangles } else { 0.0 };
         self.ahead + mesh + coming + source + changing.max(carrying)
     }
 }
@@ -172,12 +173,12 @@ fn numbers(detail: &DetailedMesh) -> f64 {
 }
 
 /// Bytes of these counts of vertices and triangles.
-fn of_both(counts: [f64; 2], bytes: [f64; 2]) -> f64 {
+fn mesh_bytes(counts: [f64; 2], bytes: [f64; 2]) -> f64 {
     counts[0] * bytes[0] + counts[1] * bytes[1]
 }
 
-/// Bytes of the work on particles whose shell has `shell` cubes, with cells of `cell` (r): the mesh is carried along, then the particles'
-/// surface and the distances from it are computed.
+/// Bytes of temporary data for particles whose shell has `shell` cubes, with cells of `cell` (r): while they carry the mesh, or later while
+/// their surface and the distances from it are computed.
 fn work(particles: f64, shell: f64, cell: f64) -> f64 {
     let carrying = CARRYING[0] * particles + CARRYING[1] * NODES * shell;
     let making: f64 = surface(shell, cell).iter().zip(SURFACE).map(|(count, bytes)| count * bytes).sum();
@@ -206,7 +207,7 @@ fn shell(positions: &[DVec3], spacing: f64) -> usize {
     let mut all: Vec<[i32; 3]> = positions.par_iter().with_min_len(4096).map(cube_of).collect();
     all.par_sort_unstable();
     let cubes = all.chunk_by(|a, b| a == b);
-    let full: Vec<[i32; 3]> = cubes.filter(|cube| cube.len() >= FULL).map(|cube| cube[0]).collect();
+    let full: Vec<[i32; 3]> = cubes.filter(|cube| cube.len() >= FULL_COUNT).map(|cube| cube[0]).collect();
     all.dedup();
     let is_inside = |cube: &[i32; 3]| {
         (-1..=1).all(|x| {
@@ -266,9 +267,9 @@ mod tests {
 
     /// The bytes for rebuilding a cube's mesh, with particles at these positions, on cells of `cell` (spacings).
     fn rebuilding(positions: Vec<DVec3>, cell: f64, detail: &DetailedMesh) -> f64 {
-        let mut most = Most::default();
-        most.add(&Particles { positions, ..Particles::default() }, 1.0, cell);
-        most.rebuilding(detail, 0)
+        let mut maxima = MaxBytes::default();
+        maxima.add(&Particles { positions, ..Particles::default() }, 1.0, cell);
+        maxima.rebuilding(detail, 0)
     }
 
     #[test]
@@ -295,8 +296,8 @@ mod tests {
         detail.mesh.positions.extend(vec![Vec3::zeros(); 3000]);
         detail.mesh.triangles.extend(vec![[0, 1, 1]; 6000]);
         let finer = of(&detail) - plain;
-        let own = 3000.0 * REBUILT[0] + 6000.0 * (REBUILT[1] + UNFIT * CUT[2]);
-        assert!((finer - own).abs() < 1.0, "{finer} is not {own}");
+        let expected = 3000.0 * REBUILT[0] + 6000.0 * (REBUILT[1] + MISMATCH * CUT[2]);
+        assert!((finer - expected).abs() < 1.0, "{finer} is not {expected}");
         // The first mesh's tree; when Gamma is freed, the transfer takes little, but more for a million numbers.
         let array = |count: usize| MeshArray {
             name: "mask".into(),

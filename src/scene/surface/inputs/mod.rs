@@ -22,10 +22,10 @@ use crate::scene::Scene;
 use crate::surface::{Implicit, Isosurface, Particles, estimate_spacing, rough_spacing};
 use particle_times::Liquid;
 
-/// Arrays that every frame writes anew, and those that a moving mesh cannot keep.
+/// Arrays of input meshes that are dropped: each frame writes its own, or they are invalid once the mesh moves.
 pub(super) const REPLACED: [&str; 9] = ["vx", "vy", "vz", "delta", "flagged", "rebuilt", "nx", "ny", "nz"];
-/// A spacing this many times as large or as small as the estimate is probably a mistake.
-const ODD: f64 = 2.0;
+/// A spacing that differs from the estimate by more than this factor is probably a mistake.
+const MAX_RATIO: f64 = 2.0;
 
 /// Contents of a scene's files.
 pub struct Inputs {
@@ -37,7 +37,7 @@ pub struct Inputs {
     pub spacing: f64,
     /// The first frame of the shot that has particles; those before it have no mesh.
     pub begins: i32,
-    /// The particles at that frame: their number, and whether they have ids or velocities.
+    /// The particles at that frame.
     pub particles: Particles,
     /// Frames at which an edited mesh replaces the tracked one, ascending.
     pub(super) sculpts: Vec<i32>,
@@ -68,7 +68,7 @@ impl Inputs {
                 "has neither ids nor velocities (attributes id and v): where its particles go is not known";
             return Err(Error::file(first, what));
         }
-        let mut warnings: Vec<String> = missing(scene, surface).into_iter().collect();
+        let mut warnings: Vec<String> = missing_file(scene, surface).into_iter().collect();
         if begins > shot.frames.first {
             warnings.push(format!(
                 "frames {} to {} have no particles, and get empty meshes: the mesh is that of frame {begins}",
@@ -97,14 +97,15 @@ impl Inputs {
                 return Err(Error::file(first, what));
             }
         };
-        if let Some(estimate) = estimate.filter(|estimate| !(1.0 / ODD..=ODD).contains(&(spacing / estimate)))
+        if let Some(estimate) =
+            estimate.filter(|estimate| !(1.0 / MAX_RATIO..=MAX_RATIO).contains(&(spacing / estimate)))
         {
             warnings.push(format!(
                 "{}: surface.spacing is {spacing} m, but particles lie {estimate:.6} m apart",
                 first.display()
             ));
         }
-        // The mesh is made, or written, with 32-bit numbers near the particles.
+        // The mesh lies near the particles, and has 32-bit positions.
         let far = base_mesh::farthest(particles.positions.iter());
         let name = first.display().to_string();
         warnings.extend(base_mesh::too_far(&name, far, 1.0, surface.cell * spacing, base_mesh::BY_KEY));
@@ -115,13 +116,13 @@ impl Inputs {
                 mesh
             }
             None => {
-                let mesh = reconstructed(ctx, &particles, spacing, surface.cell)
+                let mesh = particles_surface(ctx, &particles, spacing, surface.cell)
                     .map_err(|error| error.in_file(&first))?;
                 DetailedMesh { mesh, ..DetailedMesh::default() }
             }
         };
         if surface.mesh.is_some() {
-            warnings.extend(odd_size(&mesh.mesh, particles.positions.len(), spacing));
+            warnings.extend(volume_warning(&mesh.mesh, particles.positions.len(), spacing));
         }
         let fades = surface.half_life.is_some() || surface.fade != 0.0;
         let detail_retention = match &surface.mesh {
@@ -134,8 +135,8 @@ impl Inputs {
         let mesh = Arc::new(mesh);
         let mut inputs =
             Self { mesh, detail_retention, spacing, begins, particles, sculpts, input_hashes, warnings };
-        let of_sculpts = sculpts::check(ctx, surface, &inputs)?;
-        inputs.warnings.extend(of_sculpts);
+        let sculpt_warnings = sculpts::check(ctx, surface, &inputs)?;
+        inputs.warnings.extend(sculpt_warnings);
         inputs.warnings.iter().for_each(|warning| log::warn!("{warning}"));
         Ok(inputs)
     }
@@ -153,7 +154,7 @@ pub(super) fn read_mesh(
     spacing: f64,
 ) -> Result<(DetailedMesh, Option<String>)> {
     let bytes = input_hashes.read(path)?;
-    // Unused vertices follow nothing.
+    // Unused vertices have no surface to follow.
     let mut mesh = parse_polygons_from(path, &bytes, surface.space.origin)?.into_detailed().without_unused();
     let space = surface.space;
     mesh.mesh.positions.iter_mut().for_each(|p| *p = space.vector(p.cast()).cast());
@@ -164,14 +165,15 @@ pub(super) fn read_mesh(
         let warning = faults(path, &mesh.mesh).or_else(doubts);
         return Ok((mesh, warning));
     }
-    let (mesh, warning) = closed(ctx, mesh, spacing * surface.cell).map_err(|error| error.in_file(path))?;
+    let (mesh, warning) =
+        repaired_mesh(ctx, mesh, spacing * surface.cell).map_err(|error| error.in_file(path))?;
     Ok((mesh, warning.map(|warning| format!("{}: {warning}", path.display())).or_else(doubts)))
 }
 
 /// Detail retention, painted in the array `detail` of the vertices: shares 0..=1, as bytes 0 to 255.
 pub(super) fn detail_retention(mesh: &DetailedMesh) -> std::result::Result<Vec<f32>, String> {
-    let is_it = |array: &&MeshArray| array.name == "detail" && array.on == On::Vertices;
-    let Some(array) = mesh.arrays.iter().find(is_it) else { return Ok(Vec::new()) };
+    let is_detail = |array: &&MeshArray| array.name == "detail" && array.on == On::Vertices;
+    let Some(array) = mesh.arrays.iter().find(is_detail) else { return Ok(Vec::new()) };
     let whole = if array.number == Number::U8 { 255.0 } else { 1.0 };
     let shares: Vec<f32> = array.values.iter().map(|value| (value / whole) as f32).collect();
     match shares.iter().position(|share| !(0.0..=1.0).contains(share)) {
@@ -190,10 +192,10 @@ pub(super) fn all_files(scene: &Scene, surface: &Surface) -> Vec<PathBuf> {
 /// A warning, in a sentence, if the volume of a closed mesh is much less, or more, than that of its particles with a spacing (m). The
 /// particles' own surface lies half a spacing above the outermost ones: for thin sheets and small drops it encloses more than the
 /// particles' volume.
-fn odd_size(mesh: &TriMesh, particles: usize, spacing: f64) -> Option<String> {
+fn volume_warning(mesh: &TriMesh, particles: usize, spacing: f64) -> Option<String> {
     let (own, liquid) = (mesh.volume(), particles as f64 * spacing.powi(3));
-    let is_odd = own < liquid / ODD || own > ODD * liquid + mesh.area() * spacing;
-    (mesh.is_closed() && is_odd).then(|| {
+    let is_mismatch = own < liquid / MAX_RATIO || own > MAX_RATIO * liquid + mesh.area() * spacing;
+    (mesh.is_closed() && is_mismatch).then(|| {
         format!(
             "the mesh holds {own:.4} m3, and the first frame's {particles} particles {liquid:.4} m3: are both in the same unit?"
         )
@@ -227,26 +229,26 @@ fn first_particles(
 }
 
 /// A sentence that names a missing file of the shot, and the frames that can therefore not be made.
-fn missing(scene: &Scene, surface: &Surface) -> Option<String> {
+fn missing_file(scene: &Scene, surface: &Surface) -> Option<String> {
     let frames = scene.shot.frames;
-    let lacks = |frame: i32| {
+    let missing_at = |frame: i32| {
         let before = frame.saturating_sub(1).max(frames.first);
         let files = surface.files(surface.time(frames, before), surface.time(frames, frame));
         files.into_iter().find_map(|path| Some((frame, source::open(&path).err()?)))
     };
-    let (frame, error) = (frames.first..=frames.last).find_map(lacks)?;
+    let (frame, error) = (frames.first..=frames.last).find_map(missing_at)?;
     Some(format!("{error}: frame {frame} and those after it cannot be made"))
 }
 
 /// The particles' own surface.
-fn reconstructed(ctx: &Context, particles: &Particles, spacing: f64, cell: f64) -> Result<TriMesh> {
+fn particles_surface(ctx: &Context, particles: &Particles, spacing: f64, cell: f64) -> Result<TriMesh> {
     let phi = Implicit::new(ctx, &particles.positions, spacing, cell * spacing)?;
     Ok(Isosurface::new(&phi).mesh(&phi))
 }
 
 /// The mesh made ready for rebuilding: a closed 2-manifold by index without self-intersections, repaired in cells of an edge (m) if
 /// necessary; and a sentence about the repair.
-fn closed(ctx: &Context, mesh: DetailedMesh, cell: f64) -> Result<(DetailedMesh, Option<String>)> {
+fn repaired_mesh(ctx: &Context, mesh: DetailedMesh, cell: f64) -> Result<(DetailedMesh, Option<String>)> {
     let faults = ctx.pool().install(|| Faults::of(&mesh.mesh));
     let crossings = faults.crossings + faults.corner_crossings + faults.folds + faults.overlaps;
     let is_closed = faults.by_index.is_watertight();
@@ -287,7 +289,7 @@ fn is_only_joined(mesh: &TriMesh, Repaired { report, .. }: &Repaired) -> bool {
     report.prepared == joined && report.rebuilt_cells == 0 && report.kept_triangles == mesh.triangles.len()
 }
 
-/// A sentence about properties of a mesh that affect tracking.
+/// A warning about faults of a mesh that affect tracking.
 fn faults(path: &Path, mesh: &TriMesh) -> Option<String> {
     // The corners of .stl files are not shared vertices: each triangle would move on its own.
     if extension(path) == "stl" {

@@ -23,7 +23,7 @@ const IDS: [&str; 4] = ["id", "ids", "particle_id", "particleid"];
 ///
 /// # Errors
 /// A file that cannot be read, or that holds only the changes since another frame.
-pub fn read_cloud(path: &Path, input_hashes: &InputHashes) -> Result<ParticleData> {
+pub fn read_points(path: &Path, input_hashes: &InputHashes) -> Result<ParticleData> {
     if extension(path) != "vdb" {
         return particles::parse(path, &input_hashes.read(path)?);
     }
@@ -37,25 +37,24 @@ pub fn read_cloud(path: &Path, input_hashes: &InputHashes) -> Result<ParticleDat
 /// The particles of a file (m, m/s).
 ///
 /// # Errors
-/// As [`read_cloud`]; values that are not finite, two particles with the same id.
+/// As [`read_points`]; values that are not finite, two particles with the same id.
 pub(in crate::scene::surface) fn read(
     path: &Path,
     surface: &Surface,
     input_hashes: &InputHashes,
 ) -> Result<Particles> {
-    let cloud = read_cloud(path, input_hashes)?;
+    let data = read_points(path, input_hashes)?;
     let named = |names: &'static [&str]| {
-        let is_it = |name: &str| names.contains(&&*name.to_lowercase());
-        cloud
-            .attributes
+        let is_named = |name: &str| names.contains(&&*name.to_lowercase());
+        data.attributes
             .iter()
-            .filter(move |attribute| is_it(&attribute.name))
+            .filter(move |attribute| is_named(&attribute.name))
             .map(|attribute| &attribute.values)
     };
-    let (count, space) = (cloud.positions.len(), surface.space);
-    let brought = |speed: [f32; 3]| space.vector(DVec3::from(speed.map(f64::from))).cast::<f32>().into();
+    let (count, space) = (data.positions.len(), surface.space);
+    let converted = |speed: [f32; 3]| space.vector(DVec3::from(speed.map(f64::from))).cast::<f32>().into();
     let velocities = named(&VELOCITIES).find_map(|values| match values {
-        Values::Vector(column) => Some((0..count).map(|point| brought(column.get(point))).collect()),
+        Values::Vector(column) => Some((0..count).map(|point| converted(column.get(point))).collect()),
         _ => None,
     });
     let ids = named(&IDS).find_map(|values| match values {
@@ -63,7 +62,7 @@ pub(in crate::scene::surface) fn read(
         Values::Int(column) => Some((0..count).map(|point| column.get(point).into()).collect()),
         _ => None,
     });
-    let positions = cloud.positions.iter().map(|position| space.position(*position)).collect();
+    let positions = data.positions.iter().map(|position| space.position(*position)).collect();
     let (velocities, ids) = (velocities.unwrap_or_default(), ids.unwrap_or_default());
     let particles = Particles { positions, velocities, ids };
     particles.validate().map_err(|error| Error::file(path, error.to_string()))?;
@@ -75,21 +74,21 @@ pub(in crate::scene::surface) struct Liquid<'a> {
     surface: &'a Surface,
     shot: Shot,
     input_hashes: &'a InputHashes,
-    /// The particles of the last files, by file number.
-    kept: Vec<(i32, Arc<Particles>)>,
+    /// The particles of the files that were read last, with the files' numbers.
+    cache: Vec<(i32, Arc<Particles>)>,
 }
 
-/// Files kept in memory: those around two frames.
-pub(in crate::scene::surface) const KEPT: usize = 4;
+/// Maximum count of files in memory: those before and after two frames.
+pub(in crate::scene::surface) const CACHED_FILES: usize = 4;
 
 impl<'a> Liquid<'a> {
     pub fn new(surface: &'a Surface, shot: Shot, input_hashes: &'a InputHashes) -> Self {
-        Self { surface, shot, input_hashes, kept: Vec::new() }
+        Self { surface, shot, input_hashes, cache: Vec::new() }
     }
 
-    /// The times (frames of the sequence) through which the mesh steps from the previous frame to this one: it stops at every file in
-    /// between, so that a fast sequence loses nothing.
-    pub fn way(&self, frame: i32) -> Vec<f64> {
+    /// The times (frames of the sequence) at which the steps from the previous frame to this one begin and end. Every file in between ends
+    /// a step, so that no motion is skipped.
+    pub fn step_times(&self, frame: i32) -> Vec<f64> {
         let time = |frame: i32| self.surface.time(self.shot.frames, frame);
         let (from, to) = (time(frame - 1), time(frame));
         let between = (from.floor() as i32 + 1..to.ceil() as i32).map(f64::from);
@@ -117,7 +116,7 @@ impl<'a> Liquid<'a> {
             .map_err(|error| self.with_path(below, error))
     }
 
-    /// An error about missing data of the particles at a time, with their file.
+    /// Adds to an error the file of the particles at a time.
     pub fn with_path(&self, time: f64, error: Error) -> Error {
         error.in_file(self.path(time.floor() as i32))
     }
@@ -127,14 +126,14 @@ impl<'a> Liquid<'a> {
     }
 
     fn file(&mut self, file: i32) -> Result<Arc<Particles>> {
-        if let Some((_, particles)) = self.kept.iter().find(|(number, _)| *number == file) {
+        if let Some((_, particles)) = self.cache.iter().find(|(number, _)| *number == file) {
             return Ok(particles.clone());
         }
         let particles = Arc::new(read(&self.path(file), self.surface, self.input_hashes)?);
-        if self.kept.len() == KEPT {
-            self.kept.remove(0);
+        if self.cache.len() == CACHED_FILES {
+            self.cache.remove(0);
         }
-        self.kept.push((file, particles.clone()));
+        self.cache.push((file, particles.clone()));
         Ok(particles)
     }
 }

@@ -98,35 +98,35 @@ fn conformed(edited: DetailedMesh, first: &DetailedMesh) -> (DetailedMesh, Vec<S
     let DetailedMesh { mesh, uvs, mut arrays } = edited;
     arrays.retain(|array| !REPLACED.contains(&&*array.name));
     let (vertices, faces) = (mesh.positions.len(), mesh.triangles.len());
-    let (mut lacking, mut faults): (Vec<&str>, Vec<String>) = (Vec::new(), Vec::new());
+    let (mut missing, mut faults): (Vec<&str>, Vec<String>) = (Vec::new(), Vec::new());
     let mut taken = Vec::with_capacity(first.arrays.len());
     for own in &first.arrays {
         let found = arrays.iter().find(|array| array.name == own.name && array.on == own.on);
         let values = match found {
             Some(array) => converted(array, own.number),
             None => {
-                lacking.push(&own.name);
+                missing.push(&own.name);
                 vec![0.0; own.on.count(vertices, faces)]
             }
         };
         taken.push(MeshArray { name: own.name.clone(), on: own.on, number: own.number, values });
     }
-    // Detail retention counts even if it is not written.
+    // Detail retention is used even if the first mesh has no such array.
     let is_used = |array: &MeshArray| {
         let is_known = first.arrays.iter().any(|own| own.name == array.name);
         is_known || array.name == "detail" && array.on == On::Vertices
     };
-    let mut left: Vec<&str> =
+    let mut ignored: Vec<&str> =
         arrays.iter().filter(|array| !is_used(array)).map(|array| &*array.name).collect();
-    left.dedup();
+    ignored.dedup();
     let uvs = match (uvs, &first.uvs) {
         (Some(_), None) => {
-            left.push("texture coordinates");
+            ignored.push("texture coordinates");
             None
         }
         (None, None) => None,
         (None, Some(own)) => {
-            lacking.push("texture coordinates");
+            missing.push("texture coordinates");
             Some(Uvs::nothing(own.corners.is_some(), vertices, faces))
         }
         (Some(uvs), Some(own)) => match (&uvs.corners, own.corners.is_some()) {
@@ -140,18 +140,18 @@ fn conformed(edited: DetailedMesh, first: &DetailedMesh) -> (DetailedMesh, Vec<S
                      one side"
                         .into(),
                 );
-                let positions = of_vertices(&uvs.coordinates, corners, &mesh.triangles, vertices);
-                Some(Uvs { coordinates: positions, corners: None, missing: uvs.missing })
+                let coordinates = by_vertex(&uvs.coordinates, corners, &mesh.triangles, vertices);
+                Some(Uvs { coordinates, corners: None, missing: uvs.missing })
             }
             _ => Some(uvs),
         },
     };
-    if !lacking.is_empty() {
-        let names = lacking.join(", ");
+    if !missing.is_empty() {
+        let names = missing.join(", ");
         faults.push(format!("lacks what the first frame's mesh carries: {names}; they are 0 from here on"));
     }
-    if !left.is_empty() {
-        let names = left.join(", ");
+    if !ignored.is_empty() {
+        let names = ignored.join(", ");
         faults.push(format!("carries what the first frame's mesh does not, which is left out: {names}"));
     }
     (DetailedMesh { mesh, uvs, arrays: taken }, faults)
@@ -184,15 +184,15 @@ fn fitted(value: f64, to: Number) -> f64 {
 }
 
 /// The texture coordinates of each vertex: those of its first corner.
-fn of_vertices(
-    positions: &[[f32; 2]],
+fn by_vertex(
+    coordinates: &[[f32; 2]],
     corners: &[u32],
     triangles: &[[u32; 3]],
     vertices: usize,
 ) -> Vec<[f32; 2]> {
     let mut own: Vec<Option<[f32; 2]>> = vec![None; vertices];
     for (vertex, index) in triangles.as_flattened().iter().zip(corners) {
-        own[*vertex as usize].get_or_insert(positions[*index as usize]);
+        own[*vertex as usize].get_or_insert(coordinates[*index as usize]);
     }
     own.into_iter().map(Option::unwrap_or_default).collect()
 }
@@ -244,9 +244,9 @@ mod tests {
             array("wet", On::Corners, Number::I8, &[-128.0, 2.0, 0.0, 3.0, 0.0, 127.0]),
         ];
         assert_eq!(taken.arrays, wanted);
-        let [lacks, left] = &faults[..] else { panic!("{faults:?}") };
-        assert!(lacks.contains(": mask, part; they are 0"), "{lacks}");
-        assert!(left.ends_with("left out: heat, texture coordinates"), "{left}");
+        let [missing, ignored] = &faults[..] else { panic!("{faults:?}") };
+        assert!(missing.contains(": mask, part; they are 0"), "{missing}");
+        assert!(ignored.ends_with("left out: heat, texture coordinates"), "{ignored}");
         // Nothing is changed for the same kind of mesh, and there is no warning.
         let (same, faults) = conformed(first.clone(), &first);
         assert!(same == first && faults.is_empty(), "{faults:?}");
@@ -262,9 +262,10 @@ mod tests {
 
     #[test]
     fn texture_coordinates_have_the_form_that_those_of_the_first_mesh_have() {
-        let positions = vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
-        let seamless = Uvs { coordinates: positions.clone(), corners: None, missing: 0 };
-        let seams = Uvs { coordinates: positions.clone(), corners: Some(vec![3, 1, 2, 0, 3, 1]), missing: 1 };
+        let coordinates = vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
+        let seamless = Uvs { coordinates: coordinates.clone(), corners: None, missing: 0 };
+        let seams =
+            Uvs { coordinates: coordinates.clone(), corners: Some(vec![3, 1, 2, 0, 3, 1]), missing: 1 };
         let with = |uvs: Option<&Uvs>| DetailedMesh { mesh: mesh(2), uvs: uvs.cloned(), arrays: Vec::new() };
         let taken = |uvs, first| {
             let (mesh, faults) = conformed(with(uvs), &with(first));
@@ -272,7 +273,7 @@ mod tests {
         };
         let (uvs, faults) = taken(Some(&seamless), Some(&seams));
         let corners = Some(vec![0, 1, 2, 0, 3, 1]);
-        assert_eq!((uvs, faults), (Uvs { coordinates: positions, corners, missing: 0 }, String::new()));
+        assert_eq!((uvs, faults), (Uvs { coordinates, corners, missing: 0 }, String::new()));
         let (uvs, faults) = taken(Some(&seams), Some(&seamless));
         assert_eq!(uvs.coordinates, [[1.0, 1.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]);
         assert!(uvs.corners.is_none() && uvs.missing == 1 && faults.contains("seams"), "{faults}");

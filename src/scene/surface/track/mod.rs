@@ -25,7 +25,7 @@ use crate::scene::run::settings::{settings_of, settings_of_first_state};
 use crate::scene::run::{
     CONTENT, DoneFrames, FileKind, FrameFiles, Reads, Settings, Stage, StepTarget, Stepped, Stepping,
 };
-use tracked_shot::{At, TrackedShot, reads};
+use tracked_shot::{TrackedFrame, TrackedShot, reads};
 
 /// Name of the stage, and of the kind of its files.
 const NAME: &str = "surface";
@@ -39,7 +39,7 @@ pub struct Track<'a> {
 
 /// The mesh at a frame whose files are written; empty for a frame without particles.
 #[derive(Default)]
-pub struct Written {
+pub struct WrittenMesh {
     mesh: TriMesh,
     /// The data that the mesh carries; `None`: those of the first mesh.
     detail: Option<Arc<DetailedMesh>>,
@@ -50,9 +50,9 @@ pub struct Written {
 }
 
 impl Track<'_> {
-    /// The arrays that each frame writes anew. The mask of created faces is among them only for a mesh that was never changed and carries
-    /// none.
-    fn arrays(&self, delta: &[f32], flags: &[bool], unmade: Option<usize>) -> Vec<MeshArray> {
+    /// The arrays that each frame computes. `unchanged_faces` is the count of faces of a mesh that was never rebuilt and carries no mask of
+    /// created faces: it gets one of zeros.
+    fn arrays(&self, delta: &[f32], flags: &[bool], unchanged_faces: Option<usize>) -> Vec<MeshArray> {
         let array = |name: &str, on, number, values| MeshArray { name: name.into(), on, number, values };
         let output = self.surface.output;
         let delta = output.delta.then(|| {
@@ -63,8 +63,9 @@ impl Track<'_> {
             let values = flags.iter().map(|flag| f64::from(u8::from(*flag))).collect();
             array("flagged", On::Vertices, Number::U8, values)
         });
-        let unmade = unmade.filter(|_| output.rebuilt);
-        let rebuilt = unmade.map(|faces| array(Traced::MASK, On::Faces, Number::U8, vec![0.0; faces]));
+        let unchanged_faces = unchanged_faces.filter(|_| output.rebuilt);
+        let rebuilt =
+            unchanged_faces.map(|faces| array(Traced::MASK, On::Faces, Number::U8, vec![0.0; faces]));
         delta.into_iter().chain(flagged).chain(rebuilt).collect()
     }
 
@@ -128,8 +129,8 @@ impl Stage for Track<'_> {
     }
 
     fn clip(&self) -> Option<Clips<'_>> {
-        let (mesh, of_frame) = (&self.inputs.mesh, self.arrays(&[], &[], Some(0)));
-        let arrays: Vec<&MeshArray> = self.carried(mesh).chain(&of_frame).collect();
+        let (mesh, frame_arrays) = (&self.inputs.mesh, self.arrays(&[], &[], Some(0)));
+        let arrays: Vec<&MeshArray> = self.carried(mesh).chain(&frame_arrays).collect();
         let primvars = primvars::primvars(&arrays);
         let uvs = mesh.uvs.as_ref();
         let mesh = MeshPrim { name: NAME.into(), look: Look::Object, moves: true, uvs, primvars };
@@ -139,7 +140,7 @@ impl Stage for Track<'_> {
 
 impl<'a> Stepping for Track<'a> {
     type State = TrackedShot<'a>;
-    type Step = Option<Written>;
+    type Step = Option<WrittenMesh>;
     type Writer = ();
 
     fn load(&self, ctx: &Context, done: &DoneFrames, after: Option<i32>) -> Result<TrackedShot<'a>> {
@@ -148,35 +149,35 @@ impl<'a> Stepping for Track<'a> {
             return TrackedShot::begin(ctx, self.scene, self.surface, self.inputs);
         };
         let params = self.surface.params(self.inputs.spacing);
-        let kept = done.resume(frame, |bytes| saved_arrays::resume(params, &self.inputs.mesh, bytes))?;
-        TrackedShot::resume(ctx, (self.scene, self.surface, self.inputs), frame, kept)
+        let saved = done.resume(frame, |bytes| saved_arrays::resume(params, &self.inputs.mesh, bytes))?;
+        TrackedShot::resume(ctx, (self.scene, self.surface, self.inputs), frame, saved)
     }
 
     fn step(
         &self,
         ctx: &Context,
-        walk: &mut TrackedShot<'a>,
+        shot: &mut TrackedShot<'a>,
         to: &StepTarget<'_>,
     ) -> Result<Stepped<Self::Step>> {
-        walk.go(ctx, to.frame)?;
-        let At { tracker, detail, report, source, is_dry, .. } = walk.now();
+        shot.advance_to(ctx, to.frame)?;
+        let TrackedFrame { tracker, detail, report, source, is_dry, .. } = shot.current();
         let written = || {
             let carried = detail.as_deref().unwrap_or(&self.inputs.mesh);
             let state = saved_arrays::save(tracker, carried, source.sculpted);
             if *is_dry {
                 let detail = Some(Arc::new(carried.emptied()));
-                return Ok(Written { detail, state, ..Written::default() });
+                return Ok(WrittenMesh { detail, state, ..WrittenMesh::default() });
             }
-            let (positions, velocities) = walk.shown(ctx)?;
+            let (positions, velocities) = shot.output_vertices(ctx)?;
             let positions = usd::to_floats(&positions);
             let mesh = TriMesh { positions, triangles: tracker.triangles().to_vec() };
             let (delta, flags) = (tracker.delta().to_vec(), tracker.flags().to_vec());
-            Ok(Written { mesh, detail: detail.clone(), velocities, delta, flags, state })
+            Ok(WrittenMesh { mesh, detail: detail.clone(), velocities, delta, flags, state })
         };
         Ok(Stepped { step: to.made_from.map(|_| written()).transpose()?, report: report.clone() })
     }
 
-    fn writer(&self, _ctx: &Context, _walk: &TrackedShot<'a>) -> Result<()> {
+    fn writer(&self, _ctx: &Context, _shot: &TrackedShot<'a>) -> Result<()> {
         Ok(())
     }
 
@@ -188,13 +189,13 @@ impl<'a> Stepping for Track<'a> {
         let (Some(step), Some(files)) = (step, files) else { return Ok(()) };
         let (output, detail) = (self.surface.output, step.detail.as_deref().unwrap_or(&self.inputs.mesh));
         let has_mask = detail.arrays.iter().any(|array| array.name == Traced::MASK);
-        let unmade = (!has_mask).then_some(step.mesh.triangles.len());
-        let of_frame = self.arrays(&step.delta, &step.flags, unmade);
-        let arrays: Vec<&MeshArray> = self.carried(detail).chain(&of_frame).collect();
-        let moving =
+        let unchanged_faces = (!has_mask).then_some(step.mesh.triangles.len());
+        let frame_arrays = self.arrays(&step.delta, &step.flags, unchanged_faces);
+        let arrays: Vec<&MeshArray> = self.carried(detail).chain(&frame_arrays).collect();
+        let with_velocities =
             mesh::Carried { velocities: &step.velocities, uvs: detail.uvs.as_ref(), arrays: &arrays };
-        let velocities = if output.velocities { moving.velocities } else { &[] };
-        let carried = mesh::Carried { velocities, ..moving };
+        let velocities = if output.velocities { with_velocities.velocities } else { &[] };
+        let carried = mesh::Carried { velocities, ..with_velocities };
         if output.ply {
             files.save(NAME, "ply", &mesh::ply_bytes(&step.mesh, &carried))?;
         }
@@ -202,7 +203,7 @@ impl<'a> Stepping for Track<'a> {
             files.save(NAME, "obj", &mesh::obj_bytes(&step.mesh, &carried))?;
         }
         if output.usd {
-            files.save_clip(NAME, self.scene.shot.fps, &step.mesh, &moving)?;
+            files.save_clip(NAME, self.scene.shot.fps, &step.mesh, &with_velocities)?;
         }
         files.save_state(&step.state)
     }

@@ -10,12 +10,12 @@ use crate::surface::{Params, Tracker};
 
 /// Magic bytes, including the version.
 const MAGIC: &Magic = b"frzsrm02";
-/// Noun for messages.
+/// Names the state in messages.
 const NOUN: &str = "surface";
 
 const NUMBERS: [Number; 8] =
     [Number::I8, Number::U8, Number::I16, Number::U16, Number::I32, Number::U32, Number::F32, Number::F64];
-const POSITIONS: [On; 3] = [On::Vertices, On::Corners, On::Faces];
+const ELEMENTS: [On; 3] = [On::Vertices, On::Corners, On::Faces];
 
 /// A saved mesh.
 pub struct SavedMesh {
@@ -26,23 +26,23 @@ pub struct SavedMesh {
     pub sculpted: Option<i32>,
 }
 
-/// The exact state of a mesh, with the data that it carries now and the frame of the last edited mesh; as long as it was not rebuilt, these
-/// are the initial data and are not stored.
+/// The exact state of a mesh, with the data that it carries and the frame of the last edited mesh. Unless it was rebuilt, its data are those
+/// of the first mesh and are not stored.
 pub fn save(tracker: &Tracker, detail: &DetailedMesh, sculpted: Option<i32>) -> Vec<u8> {
-    let own = tracker.save();
+    let tracker_bytes = tracker.save();
     if !tracker.is_rebuilt() {
-        return own;
+        return tracker_bytes;
     }
     let mut to = Writer::default();
-    to.count(own.len());
-    to.0.extend(own);
+    to.count(tracker_bytes.len());
+    to.0.extend(tracker_bytes);
     to.u32(u32::from(sculpted.is_some()));
     to.u32(sculpted.unwrap_or_default().cast_unsigned());
     to.count(detail.arrays.len());
     for array in &detail.arrays {
         let code = |found: Option<usize>| found.unwrap_or_default() as u32;
         to.u32(code(NUMBERS.iter().position(|number| *number == array.number)));
-        to.u32(code(POSITIONS.iter().position(|on| *on == array.on)));
+        to.u32(code(ELEMENTS.iter().position(|on| *on == array.on)));
         to.count(array.name.len());
         to.0.extend(array.name.as_bytes());
         to.count(array.values.len());
@@ -78,13 +78,13 @@ pub fn resume(params: Params, first: &DetailedMesh, bytes: &[u8]) -> Result<Save
     let [vertices, faces] = [tracker.vertices().len(), tracker.triangles().len()];
     let mut arrays = Vec::new();
     for _ in 0..from.count(8)? {
-        let number = *NUMBERS.get(from.u32()? as usize).ok_or_else(wrong)?;
-        let on = *POSITIONS.get(from.u32()? as usize).ok_or_else(wrong)?;
+        let number = *NUMBERS.get(from.u32()? as usize).ok_or_else(mismatch)?;
+        let on = *ELEMENTS.get(from.u32()? as usize).ok_or_else(mismatch)?;
         let length = from.count(1)?;
-        let name = std::str::from_utf8(from.bytes(length)?).map_err(|_| wrong())?.to_string();
+        let name = std::str::from_utf8(from.bytes(length)?).map_err(|_| mismatch())?.to_string();
         let count = from.count(8)?;
         if count != on.count(vertices, faces) {
-            return Err(wrong());
+            return Err(mismatch());
         }
         // A file's data may be NaN.
         let values = (0..count).map(|_| Ok(f64::from_le_bytes(from.take()?))).collect::<Result<_>>()?;
@@ -99,24 +99,24 @@ pub fn resume(params: Params, first: &DetailedMesh, bytes: &[u8]) -> Result<Save
 fn uvs(from: &mut Reader<'_>, vertices: usize, faces: usize) -> Result<Uvs> {
     let missing = u64::from_le_bytes(from.take()?) as usize;
     let count = from.count(8)?;
-    let position =
+    let pair =
         |from: &mut Reader<'_>| Ok([f32::from_le_bytes(from.take()?), f32::from_le_bytes(from.take()?)]);
-    let positions = (0..count).map(|_| position(from)).collect::<Result<Vec<[f32; 2]>>>()?;
+    let coordinates = (0..count).map(|_| pair(from)).collect::<Result<Vec<[f32; 2]>>>()?;
     if from.u32()? == 0 {
         return if count == vertices {
-            Ok(Uvs { coordinates: positions, corners: None, missing })
+            Ok(Uvs { coordinates, corners: None, missing })
         } else {
-            Err(wrong())
+            Err(mismatch())
         };
     }
     let corners = (0..3 * faces).map(|_| from.u32()).collect::<Result<Vec<u32>>>()?;
     if corners.iter().any(|corner| *corner as usize >= count) {
-        return Err(wrong());
+        return Err(mismatch());
     }
-    Ok(Uvs { coordinates: positions, corners: Some(corners), missing })
+    Ok(Uvs { coordinates, corners: Some(corners), missing })
 }
 
-fn wrong() -> Error {
+fn mismatch() -> Error {
     Error::Bytes("carries what does not fit its mesh".into())
 }
 
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_kept_comes_back_and_what_was_changed_is_refused_or_read() {
+    fn a_state_round_trips_and_a_changed_one_is_refused_or_read() {
         let (tracker, first, detail) = rebuilt();
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
         let bytes = save(&tracker, &detail, Some(-7));
@@ -163,7 +163,7 @@ mod tests {
         let carried = carried.unwrap();
         assert!(save(&back, &carried, sculpted) == bytes && carried.uvs == detail.uvs);
         assert_eq!(sculpted, Some(-7));
-        // Damage never passes the checksum; behind it nothing may panic either.
+        // The checksum detects any damage; with a valid checksum, changed bytes must not panic either.
         let plain = packed::unpack(&bytes, MAGIC, NOUN).unwrap();
         let mut state = 5u64;
         let mut below = |count: usize| {
@@ -171,20 +171,20 @@ mod tests {
             (state >> 33) as usize % count
         };
         // The tracker's own bytes have their own checksum: the bytes after them are changed.
-        let own = 8 + u64::from_le_bytes(plain[..8].try_into().unwrap()) as usize;
+        let start = 8 + u64::from_le_bytes(plain[..8].try_into().unwrap()) as usize;
         let rounds = std::env::var("FRAZIL_FUZZ").ok().and_then(|text| text.parse().ok()).unwrap_or(2000);
         let saved = |kept: &SavedMesh| save(&kept.tracker, kept.detail.as_ref().unwrap(), kept.sculpted);
         let [mut refused, mut read] = [0; 2];
         for round in 0..rounds {
             let mut changed = plain.clone();
             if round % 4 == 0 {
-                let length = own + below(plain.len() - own);
+                let length = start + below(plain.len() - start);
                 changed.truncate(length);
                 let is_read = resume(params, &first, &packed::pack(&changed, MAGIC)).is_ok();
                 assert!(!is_read, "{length} of {} bytes", plain.len());
                 continue;
             }
-            let at = own + below(if round % 4 == 1 { 100 } else { plain.len() - own });
+            let at = start + below(if round % 4 == 1 { 100 } else { plain.len() - start });
             changed[at] ^= 1 << below(8);
             match resume(params, &first, &packed::pack(&changed, MAGIC)) {
                 Err(_) => refused += 1,
@@ -197,8 +197,8 @@ mod tests {
                 }
             }
         }
-        // Half of the bytes are numbers of arrays, which may be anything; most others are indices of texture coordinates, of which there
-        // are few.
+        // Half of the bytes are numbers of arrays, which may have any value. Most others are indices of texture coordinates, of which few
+        // values are valid.
         assert!(refused > rounds / 5 && read > rounds / 5, "{refused} refused, {read} read");
     }
 }

@@ -1,5 +1,5 @@
 //! The mesh from frame to frame: it steps with the liquid, keeps its arrays through changes, and is replaced by an edited mesh if there is
-//! one. Some frames are computed ahead, for velocities and for changes that show before they happen.
+//! one. Some frames are computed ahead, for velocities and to ease vertices towards coming changes.
 
 use std::cmp::Ordering;
 use std::collections::VecDeque;
@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::frame_report::report_of;
 use super::saved_arrays::SavedMesh;
-use super::vertex_paths::{Trail, Way};
+use super::vertex_paths::{VertexPaths, VertexVelocities};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::check::deviation::NearestTree;
@@ -31,45 +31,45 @@ pub struct TrackedShot<'a> {
     surface: &'a Surface,
     inputs: &'a Inputs,
     liquid: Liquid<'a>,
-    /// The frame of the first of `known`.
+    /// The current frame: the first of `frames`.
     frame: i32,
-    /// The mesh at a frame, and at the following frames as far as they are needed; at least one.
-    known: VecDeque<At>,
-    /// The first frame that could not be made ahead: beyond the shot's end, or one that fails.
+    /// The current frame, and the following ones that were computed ahead.
+    frames: VecDeque<TrackedFrame>,
+    /// The first frame that could not be computed ahead: it failed, or is beyond the shot's end.
     end: Option<i32>,
-    /// Whether the particles' faults were logged.
+    /// Whether warnings about the particles were logged.
     has_warned: bool,
 }
 
 /// A mesh made by an artist: that of the first frame, or an edited one.
 #[derive(Clone)]
 pub(in crate::scene::surface) struct Source {
-    /// The frame of an edited mesh.
+    /// The frame, if it is an edited mesh.
     pub sculpted: Option<i32>,
     mesh: Arc<DetailedMesh>,
-    /// The particles at its frame and its triangles, if the particles have ids and the mesh carries data and is rebuilt.
+    /// The particles at its frame and a tree of its triangles, if the particles have ids and the mesh carries data and may be rebuilt.
     rest: Option<Arc<(Rest, NearestTree)>>,
 }
 
 /// The mesh at a frame, with the step that led there.
-pub struct At {
+pub struct TrackedFrame {
     pub tracker: Tracker,
     /// The data that it carries; `None`: those of the first mesh.
     pub detail: Option<Arc<DetailedMesh>>,
     /// The frame's report.
     pub report: Report,
-    way: Way,
-    leads: EasingTargets,
+    velocities: VertexVelocities,
+    easing: EasingTargets,
     pub(in crate::scene::surface) source: Source,
     /// Whether the frame has no particles: its files then hold no mesh.
     pub(in crate::scene::surface) is_dry: bool,
 }
 
-impl At {
-    /// A mesh that no step led to, with the data of the first mesh.
+impl TrackedFrame {
+    /// A frame that no step led to, with the data of the first mesh.
     fn new(tracker: Tracker, source: Source, report: Report) -> Self {
-        let (way, leads) = (Way::default(), EasingTargets::default());
-        Self { tracker, detail: None, report, way, leads, source, is_dry: false }
+        let (velocities, easing) = (VertexVelocities::default(), EasingTargets::default());
+        Self { tracker, detail: None, report, velocities, easing, source, is_dry: false }
     }
 }
 
@@ -82,8 +82,8 @@ impl<'a> TrackedShot<'a> {
         let first = scene.shot.frames.first;
         // Even if particles appear later: a mesh that does not match them is refused before anything is written.
         let begun = first_mesh(ctx, surface, inputs)?;
-        let at = if inputs.begins == first { begun } else { without_mesh(surface, inputs)? };
-        Ok(Self::at((scene, surface, inputs), first, at))
+        let tracked = if inputs.begins == first { begun } else { without_mesh(surface, inputs)? };
+        Ok(Self::new((scene, surface, inputs), first, tracked))
     }
 
     /// Resumes from a mesh saved at a frame.
@@ -97,56 +97,61 @@ impl<'a> TrackedShot<'a> {
         SavedMesh { mut tracker, detail, sculpted }: SavedMesh,
     ) -> Result<Self> {
         if !tracker.is_rebuilt() {
-            let kept = tracker.set_detail_retention(inputs.detail_retention.clone());
-            kept.map_err(|error| of_first(surface, error))?;
+            let result = tracker.set_detail_retention(inputs.detail_retention.clone());
+            result.map_err(|error| in_first_file(surface, error))?;
         }
         let detail = detail.map(|detail| {
             let triangles = tracker.triangles().to_vec();
             Arc::new(DetailedMesh { mesh: TriMesh { positions: Vec::new(), triangles }, ..detail })
         });
         let source = Source::of(ctx, surface.rebuild, None, inputs.mesh.clone(), &inputs.particles);
-        // Nothing of this frame is written again.
-        let at = At { detail, ..At::new(tracker, source, Report::default()) };
-        let mut walk = Self::at(of, frame, at);
+        // The frame's files and report exist: its report is not used.
+        let tracked = TrackedFrame { detail, ..TrackedFrame::new(tracker, source, Report::default()) };
+        let mut shot = Self::new(of, frame, tracked);
         if let Some(sculpted) = sculpted {
             let source = match read_sculpt(ctx, surface, inputs, sculpted)? {
                 Some(sculpt) => {
-                    let particles = walk.liquid.at(surface.time(walk.scene.shot.frames, sculpted))?;
+                    let particles = shot.liquid.at(surface.time(shot.scene.shot.frames, sculpted))?;
                     Source::of(ctx, surface.rebuild, Some(sculpted), Arc::new(sculpt.mesh), &particles)
                 }
                 None => {
                     log::warn!(
                         "the edited mesh of frame {sculpted} is gone: what is made takes its texture from the mesh beside it"
                     );
-                    Source { sculpted: Some(sculpted), rest: None, ..walk.now().source.clone() }
+                    Source { sculpted: Some(sculpted), rest: None, ..shot.current().source.clone() }
                 }
             };
-            walk.known[0].source = source;
+            shot.frames[0].source = source;
         }
-        Ok(walk)
+        Ok(shot)
     }
 
-    fn at((scene, surface, inputs): (&'a Scene, &'a Surface, &'a Inputs), frame: i32, at: At) -> Self {
-        let (liquid, known) = (Liquid::new(surface, scene.shot, &inputs.input_hashes), VecDeque::from([at]));
-        Self { scene, surface, inputs, liquid, frame, known, end: None, has_warned: false }
+    fn new(
+        (scene, surface, inputs): (&'a Scene, &'a Surface, &'a Inputs),
+        frame: i32,
+        tracked: TrackedFrame,
+    ) -> Self {
+        let (liquid, frames) =
+            (Liquid::new(surface, scene.shot, &inputs.input_hashes), VecDeque::from([tracked]));
+        Self { scene, surface, inputs, liquid, frame, frames, end: None, has_warned: false }
     }
 
-    /// Advances to a frame, and computes as far ahead as that needs.
+    /// Advances to a frame, and computes as many frames ahead as it depends on.
     ///
     /// # Errors
     /// Files that cannot be read; errors of a step; cancel.
-    pub fn go(&mut self, ctx: &Context, frame: i32) -> Result<()> {
+    pub fn advance_to(&mut self, ctx: &Context, frame: i32) -> Result<()> {
         while self.frame < frame {
-            if self.known.len() == 1 {
+            if self.frames.len() == 1 {
                 let next = self.next(ctx, self.frame + 1)?;
-                self.known.push_back(next);
+                self.frames.push_back(next);
             }
-            self.known.pop_front();
+            self.frames.pop_front();
             self.frame += 1;
         }
-        for coming in frame + self.known.len() as i32..=frame + self.surface.looks() {
-            match self.look(ctx, coming)? {
-                Some(next) => self.known.push_back(next),
+        for coming in frame + self.frames.len() as i32..=frame + self.surface.frames_ahead() {
+            match self.look_ahead(ctx, coming)? {
+                Some(next) => self.frames.push_back(next),
                 None => break,
             }
         }
@@ -154,65 +159,66 @@ impl<'a> TrackedShot<'a> {
     }
 
     /// The mesh at the current frame.
-    pub fn now(&self) -> &At {
-        &self.known[0]
+    pub fn current(&self) -> &TrackedFrame {
+        &self.frames[0]
     }
 
-    /// Positions (m) of its vertices for output: vertices that a coming change will remove already move towards the result. With velocities
-    /// to the next frame (m/s), or if that is not known, from the previous one.
+    /// Positions (m) of the current vertices for output: those that a coming change will remove are already eased towards its result. With
+    /// their velocities (m/s) to the next frame, or from the previous one if the next is not known.
     ///
     /// # Errors
     /// Cancel.
-    pub fn shown(&self, ctx: &Context) -> Result<(Vec<DVec3>, Vec<Vec3>)> {
-        let now = self.now();
-        let mut positions = now.tracker.vertices().to_vec();
-        let mut velocities = match self.known.get(1) {
-            Some(next) => next.way.of_before.clone(),
-            None if now.way.of_after.is_empty() => vec![Vec3::zeros(); positions.len()],
-            None => now.way.of_after.clone(),
+    pub fn output_vertices(&self, ctx: &Context) -> Result<(Vec<DVec3>, Vec<Vec3>)> {
+        let current = self.current();
+        let mut positions = current.tracker.vertices().to_vec();
+        let mut velocities = match self.frames.get(1) {
+            Some(next) => next.velocities.before.clone(),
+            None if current.velocities.after.is_empty() => vec![Vec3::zeros(); positions.len()],
+            None => current.velocities.after.clone(),
         };
-        let moved = self.displaced(ctx, 0)?;
-        moved.iter().for_each(|(vertex, by)| positions[*vertex as usize] += by);
-        let Some(next) = self.known.get(1) else { return Ok((positions, velocities)) };
-        let mut then: Vec<Displaced> = self.displaced(ctx, 1)?;
-        then = then.into_iter().filter_map(|(at, by)| Some((next.leads.before(at)?, by))).collect();
-        then.sort_unstable_by_key(|(vertex, _)| *vertex);
-        let of = |list: &[Displaced], vertex: u32| {
+        let displacements = self.displaced(ctx, 0)?;
+        displacements.iter().for_each(|(vertex, by)| positions[*vertex as usize] += by);
+        let Some(next) = self.frames.get(1) else { return Ok((positions, velocities)) };
+        let next_displacements = self.displaced(ctx, 1)?.into_iter();
+        let mut next_displacements: Vec<Displaced> =
+            next_displacements.filter_map(|(vertex, by)| Some((next.easing.before(vertex)?, by))).collect();
+        next_displacements.sort_unstable_by_key(|(vertex, _)| *vertex);
+        let displacement_of = |list: &[Displaced], vertex: u32| {
             let at = list.binary_search_by_key(&vertex, |(vertex, _)| *vertex);
             at.map_or(DVec3::zeros(), |at| list[at].1)
         };
-        for Eased { vertex, now: asked, next: asked_next } in self.eased(0) {
-            let now = of(&moved, vertex);
-            // A vertex that this step removes gets the same fraction of its next displacement as of the current one.
-            let to = match next.leads.is_replaced(vertex) {
-                true if asked != DVec3::zeros() => asked_next * (now.norm() / asked.norm()),
-                true => asked_next,
-                false => of(&then, vertex),
+        for Eased { vertex, now: wanted, next: wanted_next } in self.eased(0) {
+            let displacement = displacement_of(&displacements, vertex);
+            // A vertex that the next step removes gets the same fraction of its next wanted displacement as of the current one.
+            let to = match next.easing.is_replaced(vertex) {
+                true if wanted != DVec3::zeros() => wanted_next * (displacement.norm() / wanted.norm()),
+                true => wanted_next,
+                false => displacement_of(&next_displacements, vertex),
             };
-            velocities[vertex as usize] += ((to - now) * self.scene.shot.fps).cast::<f32>();
+            velocities[vertex as usize] += ((to - displacement) * self.scene.shot.fps).cast::<f32>();
         }
         Ok((positions, velocities))
     }
 
-    /// The vertices of a known frame that are eased towards coming changes.
+    /// The vertices of the frame at `index` that are eased towards coming changes.
     fn eased(&self, index: usize) -> Vec<Eased> {
-        eased(self.known.iter().skip(index + 1).map(|at| &at.leads), self.surface.ahead as usize)
+        eased(self.frames.iter().skip(index + 1).map(|tracked| &tracked.easing), self.surface.ahead as usize)
     }
 
     /// The displacements of these vertices, as far as the mesh does not intersect itself.
     fn displaced(&self, ctx: &Context, index: usize) -> Result<Vec<Displaced>> {
-        let tracker = &self.known[index].tracker;
+        let tracker = &self.frames[index].tracker;
         uncrossed(ctx, tracker.vertices(), tracker.triangles(), displaced(&self.eased(index)))
     }
 
-    /// The frame after the known ones, if it can be made: beyond the shot's end a cache need not have it.
-    fn look(&mut self, ctx: &Context, frame: i32) -> Result<Option<At>> {
+    /// Computes the frame after those in `frames`, if possible: beyond the shot's end the particle files need not exist.
+    fn look_ahead(&mut self, ctx: &Context, frame: i32) -> Result<Option<TrackedFrame>> {
         let last = self.scene.shot.frames.last;
         if self.end.is_some_and(|end| frame >= end) {
             return Ok(None);
         }
         if frame > last {
-            let files = self.surface.between(self.scene.shot.frames, frame - 1, frame);
+            let files = self.surface.files_between(self.scene.shot.frames, frame - 1, frame);
             if !self.surface.reads_ahead() || !files.iter().all(|path| path.is_file()) {
                 return Ok(None);
             }
@@ -231,8 +237,8 @@ impl<'a> TrackedShot<'a> {
         Ok(None)
     }
 
-    /// The mesh at a frame, from the last known one, which is the previous frame.
-    fn next(&mut self, ctx: &Context, frame: i32) -> Result<At> {
+    /// The mesh at a frame, from the last of `frames`, which is the previous frame.
+    fn next(&mut self, ctx: &Context, frame: i32) -> Result<TrackedFrame> {
         match frame.cmp(&self.inputs.begins) {
             Ordering::Less => without_mesh(self.surface, self.inputs),
             Ordering::Equal => self.appear(ctx, frame),
@@ -241,82 +247,83 @@ impl<'a> TrackedShot<'a> {
     }
 
     /// The mesh at the first frame that has particles, after frames without.
-    fn appear(&self, ctx: &Context, frame: i32) -> Result<At> {
-        let mut at = first_mesh(ctx, self.surface, self.inputs)?;
-        at.leads = EasingTargets::unrelated(at.tracker.vertices().len());
+    fn appear(&self, ctx: &Context, frame: i32) -> Result<TrackedFrame> {
+        let mut tracked = first_mesh(ctx, self.surface, self.inputs)?;
+        tracked.easing = EasingTargets::unrelated(tracked.tracker.vertices().len());
         let particles = &self.inputs.particles;
-        if let Some(report) = self.resculpt(ctx, &mut at, frame, particles)? {
-            at.report = report_of(&report, particles.positions.len(), &at.tracker, true);
+        if let Some(report) = self.resculpt(ctx, &mut tracked, frame, particles)? {
+            tracked.report = report_of(&report, particles.positions.len(), &tracked.tracker, true);
         }
-        Ok(at)
+        Ok(tracked)
     }
 
     /// The mesh at a frame, carried along by the particles.
-    fn follow(&mut self, ctx: &Context, frame: i32) -> Result<At> {
+    fn follow(&mut self, ctx: &Context, frame: i32) -> Result<TrackedFrame> {
         let phases = ctx.collect();
-        let last = self.known.len() - 1;
-        let before = &mut self.known[last];
-        let begin = At::new(before.tracker.clone(), before.source.clone(), Report::default());
-        let mut at = At { detail: before.detail.clone(), ..begin };
-        // The surface that was made ahead belongs to the next one.
+        let last = self.frames.len() - 1;
+        let before = &mut self.frames[last];
+        let begin = TrackedFrame::new(before.tracker.clone(), before.source.clone(), Report::default());
+        let mut tracked = TrackedFrame { detail: before.detail.clone(), ..begin };
+        // The particles' surface that was computed ahead moves on to the clone.
         before.tracker.forget_prefetched();
-        let mut trail = Trail::of(at.tracker.vertices());
-        let times = self.liquid.way(frame);
+        let mut paths = VertexPaths::of(tracked.tracker.vertices());
+        let times = self.liquid.step_times(frame);
         let mut report = StepReport::default();
         let mut from = self.liquid.at(times[0])?;
-        // The end of each following step; beyond the shot it need not exist.
-        let beyond = self.liquid.way(frame + 1)[1];
-        let is_there = self.surface.rebuild && frame < self.scene.shot.frames.last;
-        let behind = times[2..].iter().copied().map(Some).chain([is_there.then_some(beyond)]);
-        for (ends, behind) in times.windows(2).zip(behind) {
+        // For each step, the end of the step after it, whose particles need not exist beyond the shot.
+        let next_end = self.liquid.step_times(frame + 1)[1];
+        let has_next = self.surface.rebuild && frame < self.scene.shot.frames.last;
+        let following_end = times[2..].iter().copied().map(Some).chain([has_next.then_some(next_end)]);
+        for (ends, following_end) in times.windows(2).zip(following_end) {
             let to = self.liquid.at(ends[1])?;
             let dt = (ends[1] - ends[0]) * self.liquid.file_time();
-            if let Some(Ok(particles)) = behind.map(|behind| self.liquid.at(behind)) {
-                at.tracker.prefetch(particles);
+            if let Some(Ok(particles)) = following_end.map(|following_end| self.liquid.at(following_end)) {
+                tracked.tracker.prefetch(particles);
             }
-            let triangles = self.surface.eases().then(|| at.tracker.triangles().to_vec());
-            let step = at.tracker.step(ctx, &from, &to, dt);
+            let triangles = self.surface.eases().then(|| tracked.tracker.triangles().to_vec());
+            let step = tracked.tracker.step(ctx, &from, &to, dt);
             let step = step.map_err(|error| self.liquid.with_path(ends[0], error))?;
             let share = (ends[1] - times[0]) / (times[times.len() - 1] - times[0]);
             match &step.change {
                 Some(change) => {
-                    trail.follow(&change.before, share);
-                    self.carry(ctx, &mut at, change, triangles, &to)?;
-                    trail.change(change);
+                    paths.record(&change.before, share);
+                    self.carry(ctx, &mut tracked, change, triangles, &to)?;
+                    paths.apply_change(change);
                 }
-                None => trail.follow(at.tracker.vertices(), share),
+                None => paths.record(tracked.tracker.vertices(), share),
             }
             report = report.followed_by(step);
             from = to;
         }
-        at.way = trail.way(at.tracker.vertices(), at.tracker.triangles(), self.scene.shot.fps);
-        at.is_dry = from.positions.is_empty();
-        let sculpted = self.resculpt(ctx, &mut at, frame, &from)?;
+        tracked.velocities =
+            paths.velocities(tracked.tracker.vertices(), tracked.tracker.triangles(), self.scene.shot.fps);
+        tracked.is_dry = from.positions.is_empty();
+        let sculpted = self.resculpt(ctx, &mut tracked, frame, &from)?;
         let is_resculpted = sculpted.is_some();
         let report = sculpted.into_iter().fold(report, StepReport::followed_by);
         let report = StepReport { phases: phases.times(), ..report };
         report.new_warnings(&mut self.has_warned).for_each(|warning| log::warn!("frame {frame}: {warning}"));
-        at.report = report_of(&report, from.positions.len(), &at.tracker, is_resculpted);
-        Ok(at)
+        tracked.report = report_of(&report, from.positions.len(), &tracked.tracker, is_resculpted);
+        Ok(tracked)
     }
 
     /// Carries a mesh's data and its easing targets over a change; `triangles` are those before it, if changes are eased.
     fn carry(
         &self,
         ctx: &Context,
-        at: &mut At,
+        tracked: &mut TrackedFrame,
         change: &Change,
         triangles: Option<Vec<[u32; 3]>>,
         particles: &Particles,
     ) -> Result<()> {
         if let Some(triangles) = triangles {
             let targets = EasingTargets::of(ctx, change, &triangles, self.inputs.spacing)?;
-            at.leads = std::mem::take(&mut at.leads).then(&targets);
+            tracked.easing = std::mem::take(&mut tracked.easing).then(&targets);
         }
-        let own = at.detail.as_deref().unwrap_or(&self.inputs.mesh);
-        at.detail = Some(Arc::new(match at.tracker.vertices() {
+        let own = tracked.detail.as_deref().unwrap_or(&self.inputs.mesh);
+        tracked.detail = Some(Arc::new(match tracked.tracker.vertices() {
             [] => own.emptied(),
-            _ => carried(ctx, own, &at.source, (&at.tracker, change), particles)?,
+            _ => carry_data(ctx, own, &tracked.source, (&tracked.tracker, change), particles)?,
         }));
         Ok(())
     }
@@ -325,7 +332,7 @@ impl<'a> TrackedShot<'a> {
     fn resculpt(
         &self,
         ctx: &Context,
-        at: &mut At,
+        tracked: &mut TrackedFrame,
         frame: i32,
         particles: &Particles,
     ) -> Result<Option<StepReport>> {
@@ -334,48 +341,49 @@ impl<'a> TrackedShot<'a> {
             log::warn!("{}: is left out, as frame {frame} has no particles", sculpt.path.display());
             return Ok(None);
         }
-        let old = ctx.pool().install(|| NearestTree::new(&at.tracker.mesh()));
-        let triangles = at.tracker.triangles().to_vec();
-        let report = at.tracker.resculpt(ctx, &sculpt.mesh.mesh, sculpt.detail_retention, particles);
+        let old = ctx.pool().install(|| NearestTree::new(&tracked.tracker.mesh()));
+        let triangles = tracked.tracker.triangles().to_vec();
+        let report = tracked.tracker.resculpt(ctx, &sculpt.mesh.mesh, sculpt.detail_retention, particles);
         let report = report.map_err(|error| error.in_file(&sculpt.path))?;
         // Vertices of the edited mesh move like those of the previous mesh near them.
         let velocity = |position: &DVec3| {
             let corner = old.nearest(*position).map(|near| triangles[near.triangle][0] as usize);
-            corner.and_then(|corner| at.way.of_after.get(corner).copied()).unwrap_or_default()
+            corner.and_then(|corner| tracked.velocities.after.get(corner).copied()).unwrap_or_default()
         };
-        at.way.of_after = at.tracker.vertices().iter().map(velocity).collect();
-        at.leads = std::mem::take(&mut at.leads).then(&EasingTargets::unrelated(at.tracker.vertices().len()));
+        tracked.velocities.after = tracked.tracker.vertices().iter().map(velocity).collect();
+        tracked.easing = std::mem::take(&mut tracked.easing)
+            .then(&EasingTargets::unrelated(tracked.tracker.vertices().len()));
         let mesh = Arc::new(sculpt.mesh);
-        at.source = Source::of(ctx, self.surface.rebuild, Some(frame), mesh.clone(), particles);
-        at.detail = Some(mesh);
+        tracked.source = Source::of(ctx, self.surface.rebuild, Some(frame), mesh.clone(), particles);
+        tracked.detail = Some(mesh);
         Ok(Some(report))
     }
 }
 
 /// The mesh at the first frame that has particles.
-fn first_mesh(ctx: &Context, surface: &Surface, inputs: &Inputs) -> Result<At> {
+fn first_mesh(ctx: &Context, surface: &Surface, inputs: &Inputs) -> Result<TrackedFrame> {
     let params = surface.params(inputs.spacing);
     let begun = ctx.step(4, || Tracker::begin(ctx, params, &inputs.mesh.mesh, &inputs.particles));
-    let ((mut tracker, report), phases) = begun.map_err(|error| of_first(surface, error))?;
-    let kept = tracker.set_detail_retention(inputs.detail_retention.clone());
-    kept.map_err(|error| of_first(surface, error))?;
+    let ((mut tracker, report), phases) = begun.map_err(|error| in_first_file(surface, error))?;
+    let result = tracker.set_detail_retention(inputs.detail_retention.clone());
+    result.map_err(|error| in_first_file(surface, error))?;
     let report = StepReport { phases, ..report };
     let report = report_of(&report, inputs.particles.positions.len(), &tracker, false);
     let source = Source::of(ctx, surface.rebuild, None, inputs.mesh.clone(), &inputs.particles);
-    Ok(At::new(tracker, source, report))
+    Ok(TrackedFrame::new(tracker, source, report))
 }
 
 /// A frame before the first particles.
-fn without_mesh(surface: &Surface, inputs: &Inputs) -> Result<At> {
+fn without_mesh(surface: &Surface, inputs: &Inputs) -> Result<TrackedFrame> {
     let tracker = Tracker::without_mesh(surface.params(inputs.spacing))?;
     let report = report_of(&StepReport::default(), 0, &tracker, false);
     let source = Source { sculpted: None, mesh: inputs.mesh.clone(), rest: None };
     let detail = Some(Arc::new(inputs.mesh.emptied()));
-    Ok(At { detail, is_dry: true, ..At::new(tracker, source, report) })
+    Ok(TrackedFrame { detail, is_dry: true, ..TrackedFrame::new(tracker, source, report) })
 }
 
 /// An error of the first mesh, with its file.
-fn of_first(surface: &Surface, error: Error) -> Error {
+fn in_first_file(surface: &Surface, error: Error) -> Error {
     let is_far = matches!(&error, Error::Argument(what) if what.starts_with(TOO_FAR));
     error.in_file(surface.mesh.as_ref().filter(|_| !is_far).unwrap_or(&surface.particles))
 }
@@ -396,8 +404,8 @@ impl Source {
     }
 }
 
-/// The data that a mesh carries after a change; its positions are those of the change.
-fn carried(
+/// The data that a mesh carries after a change, without positions.
+fn carry_data(
     ctx: &Context,
     own: &DetailedMesh,
     source: &Source,
@@ -408,11 +416,11 @@ fn carried(
     let mesh = TriMesh { positions: usd::to_floats(&change.before), triangles };
     let old = DetailedMesh { mesh, uvs: own.uvs.clone(), arrays: own.arrays.clone() };
     let spacing = tracker.params().spacing;
-    let (places, tree) = match source.rest.as_deref() {
+    let (positions, tree) = match source.rest.as_deref() {
         Some((rest, tree)) => (rest.of_change(ctx, particles, spacing, change)?, Some(tree)),
         None => (Vec::new(), None),
     };
-    let traced = Traced { first: &source.mesh, tree, positions: &places, spacing };
+    let traced = Traced { first: &source.mesh, tree, positions: &positions, spacing };
     let (origins, sources) = (&change.origins, &change.sources);
     ctx.phase("carry", || {
         let mut out = carry_attributes(&old, tracker.mesh(), origins, sources, Some(&traced));
@@ -438,9 +446,9 @@ impl Surface {
         }
     }
 
-    /// Number of frames computed ahead: one for velocities; with easing one more than `ahead`, so that eased vertices are known in the next
-    /// frame too.
-    pub(in crate::scene::surface) fn looks(&self) -> i32 {
+    /// Number of frames computed ahead: one for velocities; with easing one more than `ahead`, as velocities need the next frame's eased
+    /// vertices too.
+    pub(in crate::scene::surface) fn frames_ahead(&self) -> i32 {
         if self.eases() { self.ahead + 1 } else { 1 }
     }
 
@@ -454,7 +462,7 @@ impl Surface {
     }
 
     /// The files between two frames of the shot.
-    fn between(&self, shot: Frames, from: i32, to: i32) -> Vec<PathBuf> {
+    fn files_between(&self, shot: Frames, from: i32, to: i32) -> Vec<PathBuf> {
         self.files(self.time(shot, from), self.time(shot, to))
     }
 }
@@ -468,13 +476,13 @@ pub(in crate::scene::surface) fn reads(
 ) -> Reads {
     let frames = scene.shot.frames;
     let before = if frame == frames.first { frame } else { frame - 1 };
-    let particles = surface.between(frames, before, frame);
+    let particles = surface.files_between(frames, before, frame);
     let sculpt = |frame: i32| path_at(surface, &inputs.sculpts, frame);
     let mut ahead = Vec::new();
     if surface.reads_ahead() {
-        let last = frame + surface.looks();
-        ahead = surface.between(frames, frame, last);
-        // Files that are read anyway do not count as ahead.
+        let last = frame + surface.frames_ahead();
+        ahead = surface.files_between(frames, frame, last);
+        // Files that the frame itself reads are not files ahead.
         ahead.retain(|path| !particles.contains(path));
         ahead.extend((frame + 1..=last).filter_map(sculpt));
     }
