@@ -1,11 +1,11 @@
-//! The camera: given, or placed so that everything is in the picture.
+//! The camera: set by the user, or placed automatically with everything in the picture.
 
 use super::plane::Plane;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 
 /// Maximum edge of a picture (pixels).
-const LONGEST: u32 = 16_384;
+const MAX_EDGE: u32 = 16_384;
 
 /// Width and height of a picture (pixels), each at least 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,10 +22,10 @@ impl Size {
     /// # Errors
     /// One outside 1 to 16,384 pixels.
     pub(super) fn check(self) -> Result<()> {
-        if [self.width, self.height].iter().all(|edge| (1..=LONGEST).contains(edge)) {
+        if [self.width, self.height].iter().all(|edge| (1..=MAX_EDGE).contains(edge)) {
             return Ok(());
         }
-        let what = format!("a picture must have 1 to {LONGEST} pixels along each edge");
+        let what = format!("a picture must have 1 to {MAX_EDGE} pixels along each edge");
         Err(Error::argument(what))
     }
 }
@@ -33,7 +33,7 @@ impl Size {
 /// A pinhole camera; Y is up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
-    /// Where it stands (m).
+    /// Its position (m).
     pub eye: DVec3,
     /// The point in the middle of the picture (m).
     pub target: DVec3,
@@ -45,9 +45,9 @@ pub struct Camera {
 const FOV_DEG: f64 = 30.0;
 /// Part of the picture left free at each edge by the automatic camera.
 const MARGIN: f64 = 0.04;
-/// The automatic camera stands this far off the long horizontal axis of what it sees (degrees)...
+/// Angle between the automatic camera and the longer horizontal axis of what it sees (degrees).
 const AZIMUTH_DEG: f64 = 35.0;
-/// ...and this far above the horizon (degrees).
+/// Elevation of the automatic camera above the horizon (degrees).
 const ELEVATION_DEG: f64 = 33.0;
 
 impl Camera {
@@ -78,15 +78,14 @@ impl Camera {
         Self { eye: target + toward_eye * distance.max(1.0e-6), ..camera }
     }
 
-    /// Moves the camera along `toward_eye` (a unit vector from what is seen to the camera) until the box
-    /// fills the picture.
+    /// Moves the camera along `toward_eye`, a unit vector from the target to the camera, until the box fills the picture.
     fn look_from(&mut self, bounds: (DVec3, DVec3), toward_eye: DVec3, size: Size) {
         let corners: Vec<DVec3> = (0..8).map(|index| corner(bounds, index)).collect();
         let reach = ((bounds.1 - bounds.0).norm() * 0.5).max(1.0e-6);
         let aspect = f64::from(size.width) / f64::from(size.height);
         let tangent = libm::tan(self.fov_deg.to_radians() * 0.5) * (1.0 - 2.0 * MARGIN);
         self.target = (bounds.0 + bounds.1) * 0.5;
-        // Perspective shifts the middle of what is seen: centring and fitting converge in a few iterations.
+        // Perspective shifts the middle of the projected box: centring and fitting converge in a few iterations.
         for _ in 0..8 {
             self.eye = self.target + toward_eye;
             let [right, up, ahead] = self.axes();
@@ -128,14 +127,14 @@ impl Camera {
         self.lens(size).through(x, y)
     }
 
-    /// What all directions through a picture share.
+    /// Its projection to a picture of this size.
     pub(super) fn lens(&self, size: Size) -> Lens {
         let half = libm::tan(self.fov_deg.to_radians() * 0.5);
         Lens { axes: self.axes(), half, size }
     }
 }
 
-/// A camera and a picture.
+/// The projection of a camera to a picture.
 pub(super) struct Lens {
     axes: [DVec3; 3],
     /// Tangent of half the angle of view.
@@ -153,12 +152,12 @@ impl Lens {
         (ahead + right * across + up * upward).normalize()
     }
 
-    /// How far ahead of the eye a point lies (m), negative behind it; `offset` leads to it from the eye (m).
+    /// Depth of a point (m), negative behind the eye; `offset` is its offset from the eye (m).
     pub fn depth(&self, offset: DVec3) -> f64 {
         offset.dot(&self.axes[2])
     }
 
-    /// Where a point is seen, in pixels from the picture's upper left corner; `offset` leads to it from the eye (m). None for
+    /// Projection of a point, in pixels from the picture's upper left corner; `offset` is its offset from the eye (m). None for
     /// points that are not ahead.
     pub fn pixel(&self, offset: DVec3) -> Option<[f64; 2]> {
         let [right, up, _] = self.axes;
@@ -197,7 +196,7 @@ mod tests {
             let camera = Camera::framing(bounds, size);
             let [right, up, ahead] = camera.axes();
             let half = libm::tan(camera.fov_deg.to_radians() * 0.5);
-            let mut most: f64 = 0.0;
+            let mut largest: f64 = 0.0;
             for index in 0..8 {
                 let offset = corner(bounds, index) - camera.eye;
                 let depth = offset.dot(&ahead);
@@ -205,9 +204,9 @@ mod tests {
                 let x = (offset.dot(&right) / depth / half / (320.0 / 180.0)).abs();
                 let y = (offset.dot(&up) / depth / half).abs();
                 assert!(x <= 1.0 && y <= 1.0, "outside at {x} {y}: {extent:?}");
-                most = most.max(x).max(y);
+                largest = largest.max(x).max(y);
             }
-            assert!(most > 0.8, "too small: {most} {extent:?}");
+            assert!(largest > 0.8, "too small: {largest} {extent:?}");
         }
     }
 

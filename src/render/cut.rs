@@ -17,14 +17,14 @@ use crate::geometry::{DVec3, TriMesh};
 const ROWS: usize = 64;
 /// Width of a line (pixels).
 const LINE: f64 = 1.5;
-/// Minimum depth at which lines are drawn, over the distance of their farther end: nearer to the eye they are seen far outside any picture.
-const NEAREST: f64 = 1.0e-9;
-/// Light where there is no field.
+/// Minimum depth at which lines are drawn, relative to the distance of their farther end: nearer parts project far outside any picture.
+const NEAR_PLANE: f64 = 1.0e-9;
+/// Colour of pixels without a field.
 const EMPTY: [f32; 3] = [0.45, 0.47, 0.5];
 
 /// Reads the values at positions (m) into a list, which it clears first.
 type Read = dyn Fn(&Context, &[DVec3], &mut Vec<f32>) -> Result<()> + Send + Sync;
-/// Minimum and maximum corner (m); none for nothing.
+/// Minimum and maximum corner (m); none if there is nothing.
 type Bounds = Option<(DVec3, DVec3)>;
 
 /// A number at each position, such as a distance or a density.
@@ -35,9 +35,9 @@ pub struct Field {
 }
 
 impl Field {
-    /// A field that `read` samples: it gets positions (m) and puts their values into a list, which it clears first. Values in `range` take
-    /// the colours from dark blue to pale yellow, values outside those of its ends. `bounds` are the minimum and maximum corner of what is
-    /// to be seen (m).
+    /// A field that `read` samples: it gets positions (m) and puts their values into a list, which it clears first. The colours from dark blue
+    /// to pale yellow span `range`; values outside have the colours of its ends. `bounds` are the minimum and maximum corner of the part to be
+    /// drawn (m).
     pub fn new(
         bounds: Option<(DVec3, DVec3)>,
         range: [f32; 2],
@@ -75,7 +75,7 @@ impl Cut {
 
     /// Adds a field; the first of several gives the colours.
     pub fn with_field(mut self, field: Field) -> Self {
-        self.bounds = around(self.bounds, field.bounds);
+        self.bounds = united(self.bounds, field.bounds);
         self.field = self.field.or(Some(field));
         self
     }
@@ -83,7 +83,7 @@ impl Cut {
     /// Adds the lines in which a mesh meets the plane, drawn over those of earlier meshes, in a colour (linear red, green, blue, 0 to 1).
     pub fn with_surface(mut self, mesh: &TriMesh, colour: [f32; 3]) -> Self {
         let bounds = mesh.bounds().map(|(low, high)| (low.cast(), high.cast()));
-        self.bounds = around(self.bounds, bounds);
+        self.bounds = united(self.bounds, bounds);
         self.outlines.push(Outline { segments: outline(mesh, self.plane), colour: bytes(colour) });
         self
     }
@@ -93,7 +93,7 @@ impl Cut {
         self.bounds
     }
 
-    /// The values of its field at the ends of the colours; none without a field.
+    /// The values of its field with the first and the last colour; none without a field.
     pub fn range(&self) -> Option<[f32; 2]> {
         self.field.as_ref().map(|field| field.range)
     }
@@ -102,7 +102,7 @@ impl Cut {
     /// camera is not seen.
     ///
     /// # Errors
-    /// A size outside 1 to 16,384 pixels; what the field reports; a cancel.
+    /// A size outside 1 to 16,384 pixels; errors of the field; cancel.
     pub fn draw(&self, ctx: &Context, camera: &Camera, size: Size) -> Result<Picture> {
         size.check()?;
         let lens = camera.lens(size);
@@ -111,16 +111,16 @@ impl Cut {
         for (band, pixels) in rgb.chunks_mut(3 * width * ROWS).enumerate() {
             ctx.check()?;
             let first = band * ROWS * width;
-            let meets = |pixel: usize| {
+            let intersect = |pixel: usize| {
                 let [x, y] = [pixel % width, pixel / width].map(|at| at as f64 + 0.5);
-                self.plane.meets(camera.eye, lens.through(x, y))
+                self.plane.intersection(camera.eye, lens.through(x, y))
             };
-            let positions: Vec<Option<DVec3>> = (first..first + pixels.len() / 3).map(meets).collect();
+            let positions: Vec<Option<DVec3>> = (first..first + pixels.len() / 3).map(intersect).collect();
             self.fill(ctx, &positions, pixels)?;
         }
         for outline in &self.outlines {
             ctx.check()?;
-            outline.ink(&mut rgb, camera.eye, &lens, size);
+            outline.draw(&mut rgb, camera.eye, &lens, size);
         }
         Ok(Picture { size, rgb })
     }
@@ -146,51 +146,51 @@ impl Cut {
 
 impl Outline {
     /// Draws the lines onto a picture.
-    fn ink(&self, rgb: &mut [u8], eye: DVec3, lens: &Lens, size: Size) {
-        let cover = self.cover(eye, lens, size);
-        for (pixel, cover) in rgb.chunks_exact_mut(3).zip(cover.into_iter().map(u32::from)) {
-            for (value, ink) in pixel.iter_mut().zip(self.colour) {
-                let mixed = u32::from(*value) * (255 - cover) + u32::from(ink) * cover;
+    fn draw(&self, rgb: &mut [u8], eye: DVec3, lens: &Lens, size: Size) {
+        let coverage = self.coverage(eye, lens, size);
+        for (pixel, coverage) in rgb.chunks_exact_mut(3).zip(coverage.into_iter().map(u32::from)) {
+            for (value, colour) in pixel.iter_mut().zip(self.colour) {
+                let mixed = u32::from(*value) * (255 - coverage) + u32::from(colour) * coverage;
                 *value = ((mixed + 127) / 255) as u8;
             }
         }
     }
 
     /// How much of each pixel the lines cover, 0 to 255.
-    fn cover(&self, eye: DVec3, lens: &Lens, size: Size) -> Vec<u8> {
+    fn coverage(&self, eye: DVec3, lens: &Lens, size: Size) -> Vec<u8> {
         let (width, height) = (size.width as usize, size.height as usize);
-        let mut cover = vec![0u8; width * height];
+        let mut coverage = vec![0u8; width * height];
         for segment in &self.segments {
-            let Some([a, b]) = seen(lens, segment.map(|end| end - eye)) else { continue };
-            for y in near(a[1], b[1], height) {
-                for x in near(a[0], b[0], width) {
+            let Some([a, b]) = project(lens, segment.map(|end| end - eye)) else { continue };
+            for y in pixel_range(a[1], b[1], height) {
+                for x in pixel_range(a[0], b[0], width) {
                     let distance = distance(a, b, [x as f64 + 0.5, y as f64 + 0.5]);
-                    let part = (0.5 * (LINE + 1.0) - distance).clamp(0.0, 1.0);
-                    let position = &mut cover[y * width + x];
-                    *position = (*position).max((255.0 * part).round() as u8);
+                    let share = (0.5 * (LINE + 1.0) - distance).clamp(0.0, 1.0);
+                    let pixel = &mut coverage[y * width + x];
+                    *pixel = (*pixel).max((255.0 * share).round() as u8);
                 }
             }
         }
-        cover
+        coverage
     }
 }
 
-/// Where the part of a segment ahead of the eye is seen (pixels); none if all of it is behind. Its ends are relative to the eye (m).
-fn seen(lens: &Lens, [a, b]: [DVec3; 2]) -> Option<[[f64; 2]; 2]> {
+/// Projects the part of a segment ahead of the eye (pixels); none if all of it is behind. Its ends are relative to the eye (m).
+fn project(lens: &Lens, [a, b]: [DVec3; 2]) -> Option<[[f64; 2]; 2]> {
     let [from, to] = [a, b].map(|end| lens.depth(end));
-    let nearest = NEAREST * a.norm().max(b.norm());
+    let near_depth = NEAR_PLANE * a.norm().max(b.norm());
     let position = |depth: f64| a.lerp(&b, (depth - from) / (to - from));
-    let (a, b) = match (from >= nearest, to >= nearest) {
+    let (a, b) = match (from >= near_depth, to >= near_depth) {
         (true, true) => (a, b),
-        (true, false) => (a, position(nearest)),
-        (false, true) => (position(nearest), b),
+        (true, false) => (a, position(near_depth)),
+        (false, true) => (position(near_depth), b),
         (false, false) => return None,
     };
     Some([lens.pixel(a)?, lens.pixel(b)?])
 }
 
-/// The pixels of a row or column of `count` pixels that a line between two of its positions may cover.
-fn near(a: f64, b: f64, count: usize) -> Range<usize> {
+/// The pixels of a row or column of `count` pixels that a line from `a` to `b` may cover.
+fn pixel_range(a: f64, b: f64, count: usize) -> Range<usize> {
     let first = (a.min(b) - LINE).floor().max(0.0) as usize;
     let last = (a.max(b) + LINE).ceil().max(0.0) as usize;
     first..last.min(count)
@@ -198,30 +198,30 @@ fn near(a: f64, b: f64, count: usize) -> Range<usize> {
 
 /// Distance of a position from a segment (pixels).
 fn distance(a: [f64; 2], b: [f64; 2], position: [f64; 2]) -> f64 {
-    let [way, offset] = [b, position].map(|end| [end[0] - a[0], end[1] - a[1]]);
-    let length = way[0] * way[0] + way[1] * way[1];
-    let along = (way[0] * offset[0] + way[1] * offset[1]) / length;
+    let [segment, offset] = [b, position].map(|end| [end[0] - a[0], end[1] - a[1]]);
+    let length = segment[0] * segment[0] + segment[1] * segment[1];
+    let along = (segment[0] * offset[0] + segment[1] * offset[1]) / length;
     let along = if length > 0.0 { along.clamp(0.0, 1.0) } else { 0.0 };
-    let off = [0, 1].map(|axis| offset[axis] - along * way[axis]);
+    let off = [0, 1].map(|axis| offset[axis] - along * segment[axis]);
     (off[0] * off[0] + off[1] * off[1]).sqrt()
 }
 
 /// The segments in which triangles meet a plane. Corners in the plane count as beyond it, so that no segment occurs twice.
 fn outline(mesh: &TriMesh, plane: Plane) -> Vec<[DVec3; 2]> {
-    let meets = |triangle: usize| {
+    let intersect = |triangle: usize| {
         let corners = mesh.corners(triangle);
         let heights = corners.map(|corner| corner[plane.axis] - plane.at);
         let mut ends = [[0, 1], [1, 2], [2, 0]].into_iter().filter_map(|[a, b]| {
-            let part = heights[a] / (heights[a] - heights[b]);
-            ((heights[a] < 0.0) != (heights[b] < 0.0)).then(|| corners[a].lerp(&corners[b], part))
+            let share = heights[a] / (heights[a] - heights[b]);
+            ((heights[a] < 0.0) != (heights[b] < 0.0)).then(|| corners[a].lerp(&corners[b], share))
         });
         Some([ends.next()?, ends.next()?])
     };
-    (0..mesh.triangles.len()).filter_map(meets).collect()
+    (0..mesh.triangles.len()).filter_map(intersect).collect()
 }
 
 /// The box around two boxes.
-fn around(a: Bounds, b: Bounds) -> Bounds {
+fn united(a: Bounds, b: Bounds) -> Bounds {
     match (a, b) {
         (Some(a), Some(b)) => Some((a.0.inf(&b.0), a.1.sup(&b.1))),
         _ => a.or(b),
@@ -286,10 +286,10 @@ mod tests {
         let mesh = TriMesh::cuboid([-0.6, -0.4, -0.5], [0.5, 0.3, 0.5]);
         let length: f64 = outline(&mesh, plane).iter().map(|[a, b]| (a - b).norm()).sum();
         assert!((length - 2.0 * (1.1 + 0.7)).abs() < 1e-6, "{length}");
-        let bare = Cut::new(plane).with_field(ball(DVec3::zeros(), 0.3));
-        let camera = Camera::facing(bare.bounds().unwrap(), plane, SIZE);
-        let before = bare.draw(&ctx, &camera, SIZE).unwrap();
-        let after = bare.with_surface(&mesh, [0.0; 3]).draw(&ctx, &camera, SIZE).unwrap();
+        let field_only = Cut::new(plane).with_field(ball(DVec3::zeros(), 0.3));
+        let camera = Camera::facing(field_only.bounds().unwrap(), plane, SIZE);
+        let before = field_only.draw(&ctx, &camera, SIZE).unwrap();
+        let after = field_only.with_surface(&mesh, [0.0; 3]).draw(&ctx, &camera, SIZE).unwrap();
         let mut covered = 0;
         for (pixel, rgb) in after.rgb.as_chunks::<3>().0.iter().enumerate() {
             let at = position(plane, [pixel % 120, pixel / 120], [DVec3::x(), DVec3::y()]);

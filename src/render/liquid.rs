@@ -5,9 +5,9 @@ use super::shade::{Colour, Light, gloss};
 use crate::geometry::{DVec3, TriMesh};
 
 /// Maximum number of liquid surfaces that a ray passes.
-pub(super) const MOST_FILMS: usize = 8;
-/// Opacity from which the sheen of a liquid is full; it fades towards the dry rim.
-const SHEEN_FROM: f64 = 0.05;
+pub(super) const MAX_FILMS: usize = 8;
+/// Opacity at which the sheen of a liquid is full; it fades towards the thin rim.
+const FULL_SHEEN_OPACITY: f64 = 0.05;
 
 impl Model {
     /// The surface of a liquid with a colour (linear red, green, blue, 0 to 1) and an opacity per vertex, 0 to 1. It is smooth, casts no
@@ -20,8 +20,8 @@ impl Model {
     }
 }
 
-/// Light from a liquid's surface: its own, what it transmits from below, and what it mirrors.
-pub(super) fn wet(
+/// Light from a liquid's surface: its own (`own`), the light from below that it transmits, and reflections.
+pub(super) fn shade_liquid(
     light: &Light,
     hit: &Hit,
     opacity: f64,
@@ -30,7 +30,7 @@ pub(super) fn wet(
     blocked: impl Fn(DVec3) -> bool,
 ) -> Colour {
     let body = below.lerp(&own, opacity);
-    let (share, mirrored) = gloss(light, hit.normal, toward, blocked);
-    let sheen = (opacity / SHEEN_FROM).min(1.0);
-    body * (1.0 - share * sheen) + mirrored * sheen
+    let (reflectance, mirrored) = gloss(light, hit.normal, toward, blocked);
+    let sheen = (opacity / FULL_SHEEN_OPACITY).min(1.0);
+    body * (1.0 - reflectance * sheen) + mirrored * sheen
 }

@@ -1,4 +1,4 @@
-//! A surface to be drawn: triangles in a tree, normals, a colour.
+//! A surface to be drawn: triangles in a tree, with normals and colours.
 
 use super::ramp::ramp;
 use super::shade::Colour;
@@ -16,24 +16,24 @@ pub struct Model {
     colours: Option<Vec<[f32; 3]>>,
     /// Opacities of the vertices of a liquid, 0 to 1.
     pub(super) opacities: Option<Vec<f32>>,
-    /// Rays towards the light start this far off the surface (m), so that it does not shadow itself.
-    pub(super) skin: f64,
+    /// Rays towards the light start this far off the surface (m), so that it casts no shadow on itself.
+    pub(super) shadow_bias: f64,
 }
 
-/// Where a ray meets a model.
+/// The intersection of a ray with a model.
 pub(super) struct Hit {
     /// Distance along the ray (m).
     pub distance: f64,
     /// Unit normal, towards the ray's origin.
     pub normal: DVec3,
-    /// Share of the light that the surface reflects.
+    /// Share of the light that the surface reflects, for each channel.
     pub albedo: Colour,
-    /// As [`Model::skin`].
-    pub skin: f64,
-    /// How far light wraps round to the side that faces away from the sun: 0 for a surface, 1 for all around.
+    /// As [`Model::shadow_bias`].
+    pub shadow_bias: f64,
+    /// Wrap lighting: how far light reaches the side that faces away from the sun, from 0 (not at all) to 1 (all of it).
     pub wrap: f64,
     /// Opacity of a liquid, 0 to 1; none if it is not a liquid.
-    pub film: Option<f64>,
+    pub opacity: Option<f64>,
 }
 
 impl Model {
@@ -43,10 +43,10 @@ impl Model {
         Self::new(mesh.clone(), None, albedo, 1.0e-5 * extent)
     }
 
-    pub(super) fn new(mesh: TriMesh, normals: Option<Vec<Vec3>>, albedo: [f32; 3], skin: f64) -> Self {
+    pub(super) fn new(mesh: TriMesh, normals: Option<Vec<Vec3>>, albedo: [f32; 3], shadow_bias: f64) -> Self {
         let tree = Bvh::new(&mesh);
         let albedo = Colour::from(albedo.map(f64::from));
-        Self { mesh, tree, normals, albedo, colours: None, opacities: None, skin }
+        Self { mesh, tree, normals, albedo, colours: None, opacities: None, shadow_bias }
     }
 
     /// Colours the vertices by numbers, from dark blue at the minimum to pale yellow at the maximum; numbers that are not finite count as
@@ -81,17 +81,24 @@ impl Model {
         });
         // A triangle seen from behind is flipped; a smooth normal always stays on the visible side.
         let normal = if flat.dot(&toward) > 0.0 { -smooth } else { smooth };
-        let away = normal.dot(&toward).max(0.0);
-        let normal = (normal - toward * away).try_normalize(0.0).unwrap_or(-toward);
+        let facing_away = normal.dot(&toward).max(0.0);
+        let normal = (normal - toward * facing_away).try_normalize(0.0).unwrap_or(-toward);
         let albedo = self.colours.as_ref().map_or(self.albedo, |colours| {
             let [a, b, c] = corners.map(|index| Colour::from(colours[index].map(f64::from)));
             a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v
         });
-        let film = self.opacities.as_ref().map(|opacities| {
+        let opacity = self.opacities.as_ref().map(|opacities| {
             let [a, b, c] = corners.map(|index| f64::from(opacities[index]));
             (a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v).clamp(0.0, 1.0)
         });
-        Some(Hit { distance: hit.distance, normal, albedo, skin: self.skin, wrap: 0.0, film })
+        Some(Hit {
+            distance: hit.distance,
+            normal,
+            albedo,
+            shadow_bias: self.shadow_bias,
+            wrap: 0.0,
+            opacity,
+        })
     }
 
     /// Whether the surface blocks a direction from a point; a liquid's does not.

@@ -1,8 +1,8 @@
-//! Everything that is in the picture, and how it is drawn.
+//! Models, points and fogs in one picture, and how it is drawn.
 
 use super::camera::{Camera, Lens, Size};
 use super::fog::{Fog, LitFogs, Veil};
-use super::liquid::{MOST_FILMS, wet};
+use super::liquid::{MAX_FILMS, shade_liquid};
 use super::model::{Hit, Model};
 use super::picture::Picture;
 use super::shade::{Colour, Light, shade, to_bytes};
@@ -18,16 +18,17 @@ const SAMPLES: usize = 3;
 /// Samples of a pixel.
 const RAYS: usize = SAMPLES * SAMPLES;
 
-/// Input of a picture.
+/// The camera, the light, and everything prepared for them.
 struct View<'a> {
     camera: &'a Camera,
     lens: Lens,
     light: &'a Light,
-    /// The points as the camera sees them, and as they block the light.
+    /// The points as projected into the picture.
     splats: Splats<'a>,
+    /// The points as shadow casters.
     shadows: Option<Shadows>,
     fogs: LitFogs<'a>,
-    /// Whether the fogs are the same for all samples of a pixel.
+    /// Whether one ray through the fogs suffices for all samples of a pixel.
     is_smooth: bool,
 }
 
@@ -49,8 +50,7 @@ impl Models {
         Self { clouds, ..self }
     }
 
-    /// Adds fogs, through which things behind them are seen. They are lit by the sun and the sky, and weaken the sun that reaches the
-    /// models.
+    /// Adds fogs, which are transparent. They are lit by the sun and the sky, and attenuate the sunlight that reaches the models.
     pub fn with_fogs(self, fogs: Vec<Fog>) -> Self {
         Self { fogs, ..self }
     }
@@ -93,7 +93,7 @@ impl Models {
     ) -> Result<View<'a>> {
         let splats = Splats::new(ctx, &self.clouds, camera, size, SAMPLES)?;
         let shadows = Shadows::new(&self.clouds);
-        let blocked = |point, toward| self.hide(shadows.as_ref(), point, toward);
+        let blocked = |point, toward| self.is_blocked(shadows.as_ref(), point, toward);
         let fogs = LitFogs::new(ctx, &self.fogs, light.sun, blocked)?;
         let is_smooth = fogs.is_smooth(camera, size);
         Ok(View { camera, lens: camera.lens(size), light, splats, shadows, fogs, is_smooth })
@@ -111,8 +111,9 @@ impl Models {
         let veils = self.veils(view, &rays);
         let mut sum = Colour::zeros();
         for (sample, ((toward, hit), veil)) in rays.iter().zip(&veils).enumerate() {
-            if veil.through > 0.0 {
-                sum += self.seen(view, (eye, *toward), hit.as_ref(), sample, MOST_FILMS) * veil.through;
+            if veil.transmittance > 0.0 {
+                sum +=
+                    self.radiance(view, (eye, *toward), hit.as_ref(), sample, MAX_FILMS) * veil.transmittance;
             }
             sum += veil.light;
         }
@@ -143,14 +144,14 @@ impl Models {
     }
 
     /// Whether a model or a point of a cloud blocks a direction from a point.
-    fn hide(&self, shadows: Option<&Shadows>, point: DVec3, toward: DVec3) -> bool {
+    fn is_blocked(&self, shadows: Option<&Shadows>, point: DVec3, toward: DVec3) -> bool {
         self.models.iter().any(|model| model.blocks(point, toward))
-            || shadows.is_some_and(|shadows| shadows.block(point, toward))
+            || shadows.is_some_and(|shadows| shadows.blocks(point, toward))
     }
 
-    /// Light that arrives along a ray, given by its origin and direction, from what it meets, without the fogs in between; through at most
-    /// `films` liquid surfaces.
-    fn seen(
+    /// Light that arrives along a ray, given by its origin, direction and nearest hit, without the fogs in between; through at most `films`
+    /// liquid surfaces.
+    fn radiance(
         &self,
         view: &View<'_>,
         (origin, toward): (DVec3, DVec3),
@@ -159,17 +160,18 @@ impl Models {
         films: usize,
     ) -> Colour {
         let Some(hit) = hit else { return view.light.background(toward) };
-        let point = origin + toward * hit.distance + hit.normal * hit.skin;
-        let blocked = |direction| self.hide(view.shadows.as_ref(), point, direction);
-        let clear = |direction| if self.fogs.is_empty() { 1.0 } else { view.fogs.sunlight(point, direction) };
-        let own = shade(view.light, hit.normal, hit.albedo, sample, hit.wrap, blocked, clear);
-        let Some(opacity) = hit.film else { return own };
+        let point = origin + toward * hit.distance + hit.normal * hit.shadow_bias;
+        let blocked = |direction| self.is_blocked(view.shadows.as_ref(), point, direction);
+        let transmittance =
+            |direction| if self.fogs.is_empty() { 1.0 } else { view.fogs.sunlight(point, direction) };
+        let own = shade(view.light, hit.normal, hit.albedo, sample, hit.wrap, blocked, transmittance);
+        let Some(opacity) = hit.opacity else { return own };
         if films == 0 || opacity >= 1.0 {
-            return wet(view.light, hit, 1.0, [own, own], toward, blocked);
+            return shade_liquid(view.light, hit, 1.0, [own, own], toward, blocked);
         }
-        let behind = origin + toward * (hit.distance + hit.skin);
+        let behind = origin + toward * (hit.distance + hit.shadow_bias);
         let next = self.hit(behind, toward, None);
-        let below = self.seen(view, (behind, toward), next.as_ref(), sample, films - 1);
-        wet(view.light, hit, opacity, [own, below], toward, blocked)
+        let below = self.radiance(view, (behind, toward), next.as_ref(), sample, films - 1);
+        shade_liquid(view.light, hit, opacity, [own, below], toward, blocked)
     }
 }

@@ -14,10 +14,10 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Writes a PNG file, whole or not at all.
+    /// Writes a PNG file atomically.
     ///
     /// # Errors
-    /// As [`Picture::png`]; what the system refuses.
+    /// As [`Picture::png`]; a file that cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
         let bytes = self.png().map_err(|error| Error::file(path, error.to_string()))?;
         crate::io::files::atomic::write_bytes(path, &bytes)

@@ -15,7 +15,7 @@ pub struct Plane {
 
 impl Plane {
     /// Where a ray meets the plane; none if it never does.
-    pub(super) fn meets(self, eye: DVec3, toward: DVec3) -> Option<DVec3> {
+    pub(super) fn intersection(self, eye: DVec3, toward: DVec3) -> Option<DVec3> {
         let distance = (self.at - eye[self.axis]) / toward[self.axis];
         let mut position = eye + toward * distance;
         position[self.axis] = self.at;

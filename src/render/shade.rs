@@ -25,18 +25,18 @@ pub(super) const SUN: Colour = Colour::new(1.75, 1.52, 1.22);
 /// Radiance of the zenith and of the horizon.
 const ZENITH: Colour = Colour::new(0.20, 0.30, 0.48);
 const HORIZON: Colour = Colour::new(0.42, 0.50, 0.60);
-/// What a hidden part of the sky still contributes: light that snow reflected several times.
+/// Radiance from a blocked direction of the sky: light that snow has reflected several times.
 const BOUNCED: Colour = Colour::new(0.085, 0.115, 0.165);
 /// Mean radiance around a fog: half of it is sky, the other half snow.
 pub(super) const SURROUNDINGS: Colour = Colour::new(0.50, 0.545, 0.61);
 /// Angular radius of the sun's disc (radians), larger than in nature: the edges of shadows are soft.
 const SUN_RADIUS: f64 = 0.02;
-/// Sharpness of the sun's reflection in a liquid, and its brightness relative to the sun's on a surface.
+/// Exponent of the sun's specular reflection in a liquid, and its brightness relative to that of a surface in the sun.
 const GLOSS: f64 = 350.0;
 const SPOT: f64 = 1.0;
 /// Sky rays at each sample of a pixel.
 pub(super) const SKY_RAYS: usize = 4;
-/// Points of the disc that are stored: for the 9 samples of a pixel.
+/// Count of stored points of the disc: enough for the 9 samples of a pixel.
 const DISC_POINTS: usize = 9 * SKY_RAYS;
 
 impl Light {
@@ -52,7 +52,7 @@ impl Light {
         Self::from_degrees(azimuth - 112.0, 27.0)
     }
 
-    /// The light seen where there is nothing.
+    /// The light of a ray that hits nothing.
     pub(super) fn background(&self, toward: DVec3) -> Colour {
         let height = toward.y.clamp(-0.3, 1.0);
         // Below the horizon the haze darkens a little, so that a floating layer stands out.
@@ -66,9 +66,8 @@ fn sky(height: f64) -> Colour {
 
 /// Light that leaves a point towards the camera.
 ///
-/// `blocked(direction)` returns whether something blocks that direction from the point, `clear(direction)` how much of the sun's light the
-/// fog transmits, 0 to 1; `sample` numbers the samples of this pixel; `wrap` is how far light wraps round to the side that faces away, 0 to
-/// 1.
+/// `blocked(direction)` returns whether something blocks that direction from the point, `transmittance(direction)` the share of sunlight
+/// that the fog transmits, 0 to 1. `sample` numbers the samples of this pixel; `wrap` is as in `Hit`, 0 to 1.
 pub(super) fn shade(
     light: &Light,
     normal: DVec3,
@@ -76,28 +75,28 @@ pub(super) fn shade(
     sample: usize,
     wrap: f64,
     blocked: impl Fn(DVec3) -> bool,
-    clear: impl Fn(DVec3) -> f64,
+    transmittance: impl Fn(DVec3) -> f64,
 ) -> Colour {
-    let (side, other) = tangents(light.sun);
+    let (tangent, bitangent) = tangents(light.sun);
     let (x, y) = disc(sample);
-    let toward_sun = (light.sun + (side * x + other * y) * SUN_RADIUS).normalize();
+    let toward_sun = (light.sun + (tangent * x + bitangent * y) * SUN_RADIUS).normalize();
     let facing = (normal.dot(&toward_sun) + wrap) / (1.0 + wrap);
     let is_lit = facing > 0.0 && !blocked(toward_sun);
-    let sun = if is_lit { SUN * (facing * clear(toward_sun)) } else { Colour::zeros() };
-    let (side, other) = tangents(normal);
+    let sun = if is_lit { SUN * (facing * transmittance(toward_sun)) } else { Colour::zeros() };
+    let (tangent, bitangent) = tangents(normal);
     let mut fill = Colour::zeros();
     for ray in 0..SKY_RAYS {
         // Directions with density cos / pi: their mean is the light of the sky on the surface.
         let (x, y) = disc(sample * SKY_RAYS + ray);
-        let toward = side * x + other * y + normal * (1.0 - x * x - y * y).max(0.0).sqrt();
-        let open = toward.y > -0.05 && !blocked(toward);
-        fill += if open { sky(toward.y.max(0.0)) } else { BOUNCED };
+        let toward = tangent * x + bitangent * y + normal * (1.0 - x * x - y * y).max(0.0).sqrt();
+        let is_open = toward.y > -0.05 && !blocked(toward);
+        fill += if is_open { sky(toward.y.max(0.0)) } else { BOUNCED };
     }
     albedo.component_mul(&(sun + fill / SKY_RAYS as f64))
 }
 
-/// Share of the light that a wet surface reflects (Schlick 1994, for water), and the light that it reflects towards the camera: that of the
-/// sky, and of the sun in a spot that ripples blur.
+/// Share of the light that a wet surface reflects (Schlick 1994, for water), and the light that it reflects towards the camera: the sky, and a
+/// spot of the sun, blurred as by ripples.
 ///
 /// `toward` is the unit vector from the camera; `blocked(direction)` as in [`shade`].
 pub(super) fn gloss(
@@ -107,8 +106,8 @@ pub(super) fn gloss(
     blocked: impl Fn(DVec3) -> bool,
 ) -> (f64, Colour) {
     let facing = -normal.dot(&toward);
-    let rest = 1.0 - facing.clamp(0.0, 1.0);
-    let share = 0.02 + 0.98 * (rest * rest) * (rest * rest) * rest;
+    let grazing = 1.0 - facing.clamp(0.0, 1.0);
+    let share = 0.02 + 0.98 * (grazing * grazing) * (grazing * grazing) * grazing;
     let mirror = toward + normal * (2.0 * facing);
     let is_blocked = blocked(mirror);
     let sky = if is_blocked || mirror.y < -0.05 { BOUNCED } else { sky(mirror.y.clamp(0.0, 1.0)) };
@@ -133,9 +132,9 @@ fn disc(index: usize) -> (f64, f64) {
 
 /// Two unit vectors at right angles to a unit vector and to each other.
 fn tangents(normal: DVec3) -> (DVec3, DVec3) {
-    let helper = if normal.x.abs() < 0.7 { DVec3::x() } else { DVec3::y() };
-    let side = normal.cross(&helper).normalize();
-    (side, normal.cross(&side))
+    let not_parallel = if normal.x.abs() < 0.7 { DVec3::x() } else { DVec3::y() };
+    let tangent = normal.cross(&not_parallel).normalize();
+    (tangent, normal.cross(&tangent))
 }
 
 /// Linear light to the 8 bits of a picture: exposure, a shoulder that keeps white snow below 255, sRGB.

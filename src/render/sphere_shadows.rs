@@ -1,4 +1,4 @@
-//! Shadows of points: their spheres are listed in the cells of a box, which rays towards the light traverse.
+//! Shadows of points: rays towards the light traverse a grid of cells that list the spheres in them.
 
 use super::spheres::Cloud;
 use crate::geometry::DVec3;
@@ -6,12 +6,12 @@ use crate::geometry::DVec3;
 /// Edge of a cell, in mean diameters: within a heap, a cell holds some dozen spheres.
 const CELL: f64 = 2.5;
 /// Maximum number of cells: the starts of their lists take 64 MB.
-const MOST: f64 = 16.0e6;
-/// Spheres nearer than this many of their radii cast no shadow: light that enters snow comes out again about that far away, so the grains
-/// of a smooth heap do not shade each other.
-const LIT: f64 = 1.5;
+const MAX_CELLS: f64 = 16.0e6;
+/// Spheres nearer than this (their radii) cast no shadow: light that enters snow leaves it about that far away, so the grains of a smooth
+/// heap do not shade each other.
+const MIN_DISTANCE: f64 = 1.5;
 
-/// Spheres that hide the light from what is behind them.
+/// Spheres as shadow casters, in a grid of cells.
 pub(super) struct Shadows {
     low: DVec3,
     edge: f64,
@@ -35,7 +35,7 @@ impl Shadows {
         let extent = high - low;
         let mut edge = CELL * 2.0 * sum / f64::from(count);
         let cells = |edge: f64| extent.map(|length| (length / edge).floor() + 1.0);
-        while cells(edge).product() > MOST {
+        while cells(edge).product() > MAX_CELLS {
             edge *= 1.25;
         }
         let counts = cells(edge).map(|count| count as usize);
@@ -72,7 +72,7 @@ impl Shadows {
     }
 
     /// Whether a sphere blocks a direction (a unit vector) from a point; cell by cell along the ray (Amanatides and Woo 1987).
-    pub fn block(&self, origin: DVec3, toward: DVec3) -> bool {
+    pub fn blocks(&self, origin: DVec3, toward: DVec3) -> bool {
         let size = [0, 1, 2].map(|axis| self.counts[axis] as f64 * self.edge);
         let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
         for axis in 0..3 {
@@ -93,7 +93,7 @@ impl Shadows {
             at.min(self.counts[axis] - 1)
         });
         // Distances along the ray at which it leaves the cell through each side.
-        let mut side = [0, 1, 2].map(|axis| {
+        let mut exits = [0, 1, 2].map(|axis| {
             let next = cell[axis] as f64 + f64::from(u8::from(toward[axis] > 0.0));
             let distance = (self.low[axis] + next * self.edge - origin[axis]) / toward[axis];
             if toward[axis] == 0.0 { f64::INFINITY } else { distance }
@@ -101,22 +101,22 @@ impl Shadows {
         loop {
             let index = (cell[2] * self.counts[1] + cell[1]) * self.counts[0] + cell[0];
             let [first, end] = [self.starts[index], self.starts[index + 1]];
-            let is_met = |(centre, radius): &(DVec3, f64)| {
+            let is_hit = |(centre, radius): &(DVec3, f64)| {
                 let offset = centre - origin;
                 let along = offset.dot(&toward);
                 let beside = offset.norm_squared() - along * along;
-                beside < radius * radius && along > LIT * radius
+                beside < radius * radius && along > MIN_DISTANCE * radius
             };
-            if self.list[first as usize..end as usize].iter().any(is_met) {
+            if self.list[first as usize..end as usize].iter().any(is_hit) {
                 return true;
             }
-            let axis = (0..3).fold(0, |best, axis| if side[axis] < side[best] { axis } else { best });
+            let axis = (0..3).fold(0, |best, axis| if exits[axis] < exits[best] { axis } else { best });
             let last = if toward[axis] > 0.0 { self.counts[axis] - 1 } else { 0 };
             if cell[axis] == last {
                 return false;
             }
             cell[axis] = if toward[axis] > 0.0 { cell[axis] + 1 } else { cell[axis] - 1 };
-            side[axis] += self.edge / toward[axis].abs();
+            exits[axis] += self.edge / toward[axis].abs();
         }
     }
 }
@@ -127,7 +127,7 @@ mod tests {
     use crate::geometry::points::{Column, Points, Values};
 
     #[test]
-    fn rays_meet_the_spheres_that_are_in_their_way() {
+    fn rays_hit_the_spheres_on_their_path() {
         let mut state = 7u64;
         let mut random = move || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
@@ -142,13 +142,13 @@ mod tests {
         for _ in 0..2000 {
             let origin = DVec3::from([0.0; 3].map(|_: f64| 2.0 * random() - 0.5));
             let toward = DVec3::from([0.0; 3].map(|_: f64| random() - 0.5)).normalize();
-            let is_met = cloud.spheres().any(|(centre, radius)| {
+            let is_hit = cloud.spheres().any(|(centre, radius)| {
                 let offset = centre - origin;
                 let along = offset.dot(&toward);
-                along > LIT * radius && (offset - toward * along).norm() < radius
+                along > MIN_DISTANCE * radius && (offset - toward * along).norm() < radius
             });
-            assert_eq!(shadows.block(origin, toward), is_met, "{origin:?} {toward:?}");
-            hidden += u32::from(is_met);
+            assert_eq!(shadows.blocks(origin, toward), is_hit, "{origin:?} {toward:?}");
+            hidden += u32::from(is_hit);
         }
         assert!((50..1500).contains(&hidden), "{hidden}");
         assert!(Shadows::new(&[]).is_none());

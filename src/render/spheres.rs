@@ -1,5 +1,5 @@
-//! Points drawn as spheres: each is projected into a buffer that holds the nearest sphere at each sample of the picture. No rays are
-//! traced: a million points take about as long as the rest of the picture.
+//! Points drawn as spheres, which are rasterised into a buffer of the nearest sphere at each sample of the picture. As no rays are traced, a
+//! million points take about as long as the rest of the picture.
 
 use rayon::prelude::*;
 
@@ -15,13 +15,13 @@ use crate::geometry::points::{Column, Points, Values};
 /// Samples along an edge of a tile; a task draws one tile.
 const TILE: usize = 32;
 /// Samples of a tile.
-const AREA: usize = TILE * TILE;
+const TILE_SAMPLES: usize = TILE * TILE;
 /// Spheres between two checks whether a tile is full.
-const LOOK: usize = 64;
+const SPHERES_PER_CHECK: usize = 64;
 /// As [`Hit::wrap`]: grains of snow let light through.
 const WRAP: f64 = 0.5;
 /// Minimum radius of a sphere in the picture (samples): a smaller one could fall between samples.
-const LEAST_SEEN: f64 = 0.75;
+const MIN_RADIUS: f64 = 0.75;
 
 /// Points, ready to be drawn.
 pub struct Cloud {
@@ -46,8 +46,8 @@ impl Cloud {
         let unknown = |name: &str| {
             let names: Vec<&str> =
                 points.attributes.iter().map(|attribute| attribute.name.as_str()).collect();
-            let there = if names.is_empty() { "none".to_string() } else { names.join(", ") };
-            Error::argument(format!("the points have no attribute \"{name}\"; they have {there}"))
+            let available = if names.is_empty() { "none".to_string() } else { names.join(", ") };
+            Error::argument(format!("the points have no attribute \"{name}\"; they have {available}"))
         };
         let coloured = match colour {
             Some(name) => Some(points.attribute(name).ok_or_else(|| unknown(name))?),
@@ -105,21 +105,21 @@ pub(super) struct Splats<'a> {
 /// Distance (m), cloud, sphere.
 type Nearest = (f32, u32, u32);
 
-/// A sphere on the picture: the samples that it may cover.
-struct Seen {
+/// The projection of a sphere: the samples that it may cover.
+struct Splat {
     /// Lower bound of its distance from the eye (m).
-    least: f32,
+    min_distance: f32,
     cloud: u32,
     sphere: u32,
-    /// Radius (m), enlarged if necessary to be seen.
+    /// Radius (m), enlarged if necessary so that it covers a sample.
     radius: f64,
     columns: [u32; 2],
     rows: [u32; 2],
 }
 
 impl<'a> Splats<'a> {
-    /// Draws clouds with `samples` samples along each edge of a pixel: the same with any number of threads, as each tile processes the
-    /// spheres in the same order.
+    /// Draws clouds with `samples` samples along each edge of a pixel. The result is the same with any number of threads, as each tile draws
+    /// its spheres in a fixed order.
     pub fn new(
         ctx: &Context,
         clouds: &'a [Cloud],
@@ -133,38 +133,41 @@ impl<'a> Splats<'a> {
             return Ok(Self { clouds, across, nearest: Vec::new() });
         }
         let view = View::new(camera, width, height);
-        let mut seen: Vec<Seen> = Vec::new();
+        let mut splats: Vec<Splat> = Vec::new();
         for (cloud, number) in clouds.iter().zip(0..) {
             ctx.check()?;
             let spheres = cloud.spheres.par_iter().enumerate();
-            seen.par_extend(spheres.filter_map(|(n, sphere)| view.see(sphere, number, n as u32)));
+            splats.par_extend(spheres.filter_map(|(n, sphere)| view.project(sphere, number, n as u32)));
         }
         // Front to back: a hidden sphere then costs one comparison per sample. Equal distances keep the order of the points.
-        seen.par_sort_unstable_by(|a, b| {
-            a.least.total_cmp(&b.least).then((a.cloud, a.sphere).cmp(&(b.cloud, b.sphere)))
+        splats.par_sort_unstable_by(|a, b| {
+            a.min_distance.total_cmp(&b.min_distance).then((a.cloud, a.sphere).cmp(&(b.cloud, b.sphere)))
         });
         let mut tiles: Vec<Vec<u32>> = vec![Vec::new(); across * height.div_ceil(TILE)];
-        for (seen, n) in seen.iter().zip(0..) {
+        for (splat, n) in splats.iter().zip(0..) {
             let [rows, columns] =
-                [seen.rows, seen.columns].map(|[low, high]| low as usize / TILE..=high as usize / TILE);
+                [splat.rows, splat.columns].map(|[low, high]| low as usize / TILE..=high as usize / TILE);
             for row in rows {
                 columns.clone().for_each(|column| tiles[row * across + column].push(n));
             }
         }
-        let mut nearest = vec![(f32::INFINITY, 0, 0); tiles.len() * AREA];
-        nearest.par_chunks_mut(AREA).zip(&tiles).enumerate().try_for_each(|(tile, (position, list))| {
-            ctx.check()?;
-            let corner = [tile % across * TILE, tile / across * TILE];
-            draw_tile(&view, clouds, list.iter().map(|&n| &seen[n as usize]), corner, position);
-            Ok::<(), Error>(())
-        })?;
+        let mut nearest = vec![(f32::INFINITY, 0, 0); tiles.len() * TILE_SAMPLES];
+        nearest.par_chunks_mut(TILE_SAMPLES).zip(&tiles).enumerate().try_for_each(
+            |(tile, (samples, list))| {
+                ctx.check()?;
+                let corner = [tile % across * TILE, tile / across * TILE];
+                draw_tile(&view, clouds, list.iter().map(|&n| &splats[n as usize]), corner, samples);
+                Ok::<(), Error>(())
+            },
+        )?;
         Ok(Self { clouds, across, nearest })
     }
 
     /// The sphere that a ray with this unit direction meets first; the ray goes through a sample of the picture.
     pub fn at(&self, x: usize, y: usize, eye: DVec3, toward: DVec3) -> Option<Hit> {
         let tile = y / TILE * self.across + x / TILE;
-        let (distance, cloud, sphere) = *self.nearest.get(tile * AREA + y % TILE * TILE + x % TILE)?;
+        let (distance, cloud, sphere) =
+            *self.nearest.get(tile * TILE_SAMPLES + y % TILE * TILE + x % TILE)?;
         if distance.is_infinite() {
             return None;
         }
@@ -172,9 +175,9 @@ impl<'a> Splats<'a> {
         let distance = f64::from(distance);
         // Enlarged spheres have the same normals as others.
         let normal = (eye + toward * distance - centre).try_normalize(0.0).unwrap_or(-toward);
-        let skin = 0.01 * radius.max(1e-9);
+        let shadow_bias = 0.01 * radius.max(1e-9);
         let albedo = Colour::from(albedo.map(f64::from));
-        Some(Hit { distance, normal, albedo, skin, wrap: WRAP, film: None })
+        Some(Hit { distance, normal, albedo, shadow_bias, wrap: WRAP, opacity: None })
     }
 }
 
@@ -182,34 +185,35 @@ impl<'a> Splats<'a> {
 fn draw_tile<'s>(
     view: &View,
     clouds: &[Cloud],
-    list: impl Iterator<Item = &'s Seen>,
+    list: impl Iterator<Item = &'s Splat>,
     corner: [usize; 2],
     tile: &mut [Nearest],
 ) {
     // Samples of the last tiles outside the picture never fill.
     let [right, bottom] = [(view.width - corner[0]).min(TILE), (view.height - corner[1]).min(TILE)];
-    for (n, seen) in list.enumerate() {
-        if n.is_multiple_of(LOOK) {
+    for (n, splat) in list.enumerate() {
+        if n.is_multiple_of(SPHERES_PER_CHECK) {
             let rows = tile.chunks(TILE).take(bottom);
-            if rows.flat_map(|row| &row[..right]).all(|position| position.0 <= seen.least) {
+            if rows.flat_map(|row| &row[..right]).all(|sample| sample.0 <= splat.min_distance) {
                 return;
             }
         }
-        let centre = clouds[seen.cloud as usize].spheres[seen.sphere as usize].centre;
+        let centre = clouds[splat.cloud as usize].spheres[splat.sphere as usize].centre;
         let inside = |[low, high]: [u32; 2], corner: usize, count: usize| {
             (low as usize).max(corner) - corner..=(high as usize - corner).min(count - 1)
         };
-        for y in inside(seen.rows, corner[1], bottom) {
-            for x in inside(seen.columns, corner[0], right) {
-                let position = &mut tile[y * TILE + x];
-                if position.0 <= seen.least {
+        for y in inside(splat.rows, corner[1], bottom) {
+            for x in inside(splat.columns, corner[0], right) {
+                let sample = &mut tile[y * TILE + x];
+                if sample.0 <= splat.min_distance {
                     continue;
                 }
-                let Some(distance) = view.meet(centre, seen.radius, corner[0] + x, corner[1] + y) else {
+                let Some(distance) = view.intersect(centre, splat.radius, corner[0] + x, corner[1] + y)
+                else {
                     continue;
                 };
-                if (distance as f32) < position.0 {
-                    *position = (distance as f32, seen.cloud, seen.sphere);
+                if (distance as f32) < sample.0 {
+                    *sample = (distance as f32, splat.cloud, splat.sphere);
                 }
             }
         }
@@ -233,9 +237,9 @@ impl View {
     }
 
     /// The samples that a sphere may cover.
-    fn see(&self, sphere: &Sphere, cloud: u32, index: u32) -> Option<Seen> {
+    fn project(&self, sphere: &Sphere, cloud: u32, index: u32) -> Option<Splat> {
         let [x, y, z] = self.axes.map(|axis| axis.dot(&(sphere.centre - self.eye)));
-        let radius = sphere.radius.max(LEAST_SEEN * z / self.scale);
+        let radius = sphere.radius.max(MIN_RADIUS * z / self.scale);
         // A sphere that contains the camera, or is beside it, is left out: it would hide everything.
         if z <= radius {
             return None;
@@ -243,8 +247,8 @@ impl View {
         // Tangents from the eye to the sphere's circle in the plane of an axis and the view.
         let range = |side: f64| {
             let root = radius * (side * side + z * z - radius * radius).sqrt();
-            let below = z * z - radius * radius;
-            [(side * z - root) / below * self.scale, (side * z + root) / below * self.scale]
+            let denominator = z * z - radius * radius;
+            [(side * z - root) / denominator * self.scale, (side * z + root) / denominator * self.scale]
         };
         let clip = |[low, high]: [f64; 2], middle: f64, count: usize| {
             let (low, high) =
@@ -255,12 +259,12 @@ impl View {
         // Rows count downward.
         let rows = clip(range(-y), 0.5 * self.height as f64, self.height)?;
         // Rounded down, so that it bounds distances that are rounded too.
-        let least = ((sphere.centre - self.eye).norm() - radius) as f32 * (1.0 - 1e-6);
-        Some(Seen { least, cloud, sphere: index, radius, columns, rows })
+        let min_distance = ((sphere.centre - self.eye).norm() - radius) as f32 * (1.0 - 1e-6);
+        Some(Splat { min_distance, cloud, sphere: index, radius, columns, rows })
     }
 
     /// The distance (m) at which the ray through a sample meets a sphere.
-    fn meet(&self, centre: DVec3, radius: f64, x: usize, y: usize) -> Option<f64> {
+    fn intersect(&self, centre: DVec3, radius: f64, x: usize, y: usize) -> Option<f64> {
         let across = (x as f64 + 0.5 - 0.5 * self.width as f64) / self.scale;
         let upward = (0.5 * self.height as f64 - y as f64 - 0.5) / self.scale;
         let toward = self.axes[2] + self.axes[0] * across + self.axes[1] * upward;

@@ -15,7 +15,7 @@ impl Model {
     /// A level set with the colour of snow.
     ///
     /// # Errors
-    /// A cancel, or what OpenVDB reports.
+    /// Errors of OpenVDB; cancel.
     pub fn level_set(ctx: &Context, grid: &FloatGrid) -> Result<Self> {
         let mesh = level_set::to_mesh(ctx, grid, 0.0, 0.0)?;
         let normals = smooth_normals(&mesh);
@@ -24,21 +24,22 @@ impl Model {
 }
 
 impl Fog {
-    /// A fog volume. A value of 1 attenuates light per metre as its metadata `frazil:density_scale` says, or by `extinction` without that
-    /// (1/m, over short paths, above 0). Inactive voxels, and values below 0, count as empty.
+    /// A fog volume. A density of 1 has the extinction (1/m) of the metadata `frazil:density_scale`, or without it `extinction` (1/m, above 0).
+    /// Inactive voxels and values below 0 are empty.
     ///
     /// # Errors
     /// A transform that is not linear; a scale that is not a number of 0 or more; densities too far apart to be drawn, or too many for the
     /// memory limit; a cancel.
     pub fn grid(ctx: &Context, grid: &FloatGrid, extinction: f64) -> Result<Self> {
-        let wrong = |what: String| Error::argument(format!("grid \"{}\" {what}", grid.name()));
-        let placement = placement(grid).ok_or_else(|| wrong("has a transform that is not linear".into()))?;
+        let grid_error = |what: String| Error::argument(format!("grid \"{}\" {what}", grid.name()));
+        let placement =
+            placement(grid).ok_or_else(|| grid_error("has a transform that is not linear".into()))?;
         let extinction = density_scale(grid)?.unwrap_or(extinction);
         let tiles: Vec<Tile> =
             grid.tiles()?.into_iter().filter(|tile| tile.active && tile.value > 0.0).collect();
         let edge = |tile: &Tile| u64::from(tile.edge.unsigned_abs()) / DIM as u64;
         let count: u64 = tiles.iter().map(|tile| edge(tile).pow(3)).sum();
-        ctx.allow("a fog", count * TILE_BYTES)?;
+        ctx.allow("a fog", count * BYTES_PER_TILE_BLOCK)?;
         let leaves = grid.leaves()?;
         let mut parts: Vec<(Origin, Part<'_>)> =
             leaves.iter().map(|leaf| (leaf.origin, Part::Dense(leaf.values, leaf.mask))).collect();
@@ -46,10 +47,10 @@ impl Fog {
             let edge = edge(tile) as i32;
             let positions = (0..edge * edge * edge).map(|n| [n / (edge * edge), n / edge % edge, n % edge]);
             let origin = |at: Origin| [0, 1, 2].map(|axis| tile.origin[axis] + DIM as i32 * at[axis]);
-            parts.extend(positions.map(|at| (origin(at), Part::Even(tile.value))));
+            parts.extend(positions.map(|at| (origin(at), Part::Uniform(tile.value))));
         }
         Self::of_parts(ctx, placement, parts, extinction).map_err(|error| match error {
-            Error::Argument(what) => wrong(what),
+            Error::Argument(what) => grid_error(what),
             other => other,
         })
     }
@@ -65,7 +66,7 @@ impl Field {
         let bounds = bounds_of(&grid);
         let range = match grid.class() {
             GridClass::LevelSet => [-grid.background().abs(), grid.background().abs()],
-            _ => range(ctx, &grid)?,
+            _ => value_range(ctx, &grid)?,
         };
         let read = move |ctx: &Context, positions: &[DVec3], values: &mut Vec<f32>| {
             grid.sample_linear(ctx, positions, values)
@@ -74,24 +75,24 @@ impl Field {
     }
 }
 
-/// Memory (bytes) of a leaf in a list of leaves, including while that list is made; its values are not copied.
-const LISTED: u64 = 80;
+/// Memory (bytes) of a leaf in a list of leaves, and while that list is made; its values are not copied.
+const BYTES_PER_LISTED_LEAF: u64 = 80;
 /// Leaves between two checks for a cancel.
-const LEAVES: usize = 4096;
+const LEAVES_PER_CHECK: usize = 4096;
 
-/// Minimum and maximum of 0 and a grid's finite values.
-fn range(ctx: &Context, grid: &FloatGrid) -> Result<[f32; 2]> {
-    ctx.allow("a list of a grid's leaves", grid.leaf_count() as u64 * LISTED)?;
-    let wider = |[low, high]: [f32; 2], value: f32| match value {
+/// Minimum and maximum of 0 and the finite values of a grid.
+fn value_range(ctx: &Context, grid: &FloatGrid) -> Result<[f32; 2]> {
+    ctx.allow("a list of a grid's leaves", grid.leaf_count() as u64 * BYTES_PER_LISTED_LEAF)?;
+    let extended = |[low, high]: [f32; 2], value: f32| match value {
         _ if !value.is_finite() => [low, high],
         _ if value < low => [value, high],
         _ if value > high => [low, value],
         _ => [low, high],
     };
-    let mut range = grid.tiles()?.iter().map(|tile| tile.value).fold([0.0; 2], wider);
-    for leaves in grid.leaves()?.chunks(LEAVES) {
+    let mut range = grid.tiles()?.iter().map(|tile| tile.value).fold([0.0; 2], extended);
+    for leaves in grid.leaves()?.chunks(LEAVES_PER_CHECK) {
         ctx.check()?;
-        range = leaves.iter().flat_map(|leaf| leaf.values.iter().copied()).fold(range, wider);
+        range = leaves.iter().flat_map(|leaf| leaf.values.iter().copied()).fold(range, extended);
     }
     Ok(range)
 }
@@ -106,7 +107,7 @@ fn bounds_of(grid: &FloatGrid) -> Option<(DVec3, DVec3)> {
 }
 
 /// Memory (bytes) of a block of a tile while it is prepared.
-const TILE_BYTES: u64 = 64;
+const BYTES_PER_TILE_BLOCK: u64 = 64;
 
 /// The density scale in a fog's metadata.
 fn density_scale(grid: &FloatGrid) -> Result<Option<f64>> {
@@ -125,18 +126,18 @@ fn density_scale(grid: &FloatGrid) -> Result<Option<f64>> {
     })
 }
 
-/// Positions of a grid's voxels; none if its transform is not linear.
+/// Placement of a grid's voxels in the world; none if its transform is not linear.
 fn placement(grid: &FloatGrid) -> Option<Placement> {
     let origin = grid.index_to_world(DVec3::zeros());
     let axes = [DVec3::x(), DVec3::y(), DVec3::z()].map(|axis| grid.index_to_world(axis) - origin);
     let placement = Placement::new(origin, axes)?;
-    // Perspective shows at the corners of the active voxels.
+    // A perspective transform differs from the linear one at the corners of the active voxels.
     let (low, high) = grid.active_bbox().unwrap_or_default();
     let bounds = (DVec3::from(low.map(f64::from)), DVec3::from(high.map(f64::from)));
     let is_linear = (0..8).all(|n| {
         let corner = corner(bounds, n);
-        let off = grid.index_to_world(corner) - placement.to_world(corner);
-        off.norm() <= 1.0e-6 * placement.cell() * (1.0 + corner.norm())
+        let error = grid.index_to_world(corner) - placement.to_world(corner);
+        error.norm() <= 1.0e-6 * placement.cell() * (1.0 + corner.norm())
     });
     is_linear.then_some(placement)
 }

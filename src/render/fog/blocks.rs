@@ -21,17 +21,17 @@ pub(super) const NODE: i32 = 16;
 /// Blocks of a node.
 const NODE_BLOCKS: usize = (NODE * NODE * NODE) as usize;
 /// Maximum number of nodes in the box around a fog: their table takes 64 MB.
-const MOST_NODES: f64 = (1 << 24) as f64;
+const MAX_NODES: f64 = (1 << 24) as f64;
 /// Voxel coordinates have magnitudes below this.
-const FARTHEST: i32 = 1 << 30;
+const COORDINATE_LIMIT: i32 = 1 << 30;
 /// Maximum extinction (1/m): no light passes a micrometre.
-const MOST_EXTINCTION: f64 = 1.0e6;
+const MAX_EXTINCTION: f64 = 1.0e6;
 /// Voxels below this share of the maximum extinction are left out of the bounds, so that invisible wisps do not widen the view.
-const SEEN: f32 = 0.01;
-/// Memory (bytes) of a block with its own samples while a fog is made: these, twice, and its light.
-const DENSE_BYTES: u64 = 2 * size_of::<Samples>() as u64 + 1500;
+const VISIBLE_SHARE: f32 = 0.01;
+/// Memory (bytes) of a block with its own samples while a fog is made: its samples twice, and its light.
+const BYTES_PER_DENSE_BLOCK: u64 = 2 * size_of::<Samples>() as u64 + 1500;
 /// Memory (bytes) of any block position while a fog is made.
-const POSITION_BYTES: u64 = 256;
+const BYTES_PER_POSITION: u64 = 256;
 /// No node, or no block.
 const NONE: u32 = u32::MAX;
 
@@ -99,7 +99,7 @@ pub enum Part<'a> {
     /// One for each voxel; voxels that are not active are empty.
     Dense(&'a Values, &'a Mask),
     /// The same for all.
-    Even(f32),
+    Uniform(f32),
 }
 
 impl Part<'_> {
@@ -107,27 +107,28 @@ impl Part<'_> {
         match self {
             Self::Dense(values, mask) if mask[voxel >> 6] >> (voxel & 63) & 1 == 1 => values[voxel].max(0.0),
             Self::Dense(..) => 0.0,
-            Self::Even(density) => density.max(0.0),
+            Self::Uniform(density) => density.max(0.0),
         }
     }
 
     fn is_empty(&self) -> bool {
         match self {
             Self::Dense(..) => (0..DIM * DIM * DIM).all(|voxel| self.density(voxel) == 0.0),
-            Self::Even(density) => *density <= 0.0,
+            Self::Uniform(density) => *density <= 0.0,
         }
     }
 }
 
 /// The samples of a block.
-enum Filled {
-    Even(f32),
+enum BlockSamples {
+    Uniform(f32),
     Dense(Box<Samples>),
 }
 
 impl Fog {
-    /// A fog of densities by block position (a multiple of 8 on each axis), each at most once. Density 1 removes the share `extinction`
-    /// of the light per metre, over short paths (1/m, above 0; density times extinction counts as a million at most).
+    /// A fog of densities by block position (a multiple of 8 on each axis), each at most once. A density of 1 has this extinction (1/m, above
+    /// 0); density times extinction is clamped to a million.
+    ///
     /// # Errors
     /// Densities too far apart, or too many for the memory limit; cancel.
     pub fn of_parts(
@@ -139,23 +140,27 @@ impl Fog {
         parts.retain(|(_, part)| !part.is_empty());
         let (low, counts) = node_box(&parts)?;
         const WHAT: &str = "a fog";
-        // For each block, the eight positions whose samples it contributes to.
+        // Each block contributes to the samples of eight positions.
         ctx.allow(WHAT, 8 * parts.len() as u64 * size_of::<Origin>() as u64)?;
         let positions = ctx.pool().install(|| positions(&parts));
-        ctx.allow(WHAT, parts.len() as u64 * POSITION_BYTES + positions.len() as u64 * POSITION_BYTES)?;
-        let of_position: HashMap<Origin, Part<'_>> = parts.iter().copied().collect();
-        let dense = positions.iter().filter(|position| even_at(**position, &of_position).is_none()).count();
+        ctx.allow(
+            WHAT,
+            parts.len() as u64 * BYTES_PER_POSITION + positions.len() as u64 * BYTES_PER_POSITION,
+        )?;
+        let by_position: HashMap<Origin, Part<'_>> = parts.iter().copied().collect();
+        let dense =
+            positions.iter().filter(|position| uniform_density(**position, &by_position).is_none()).count();
         let nodes: HashSet<[i32; 3]> =
             positions.iter().map(|position| position.map(|at| at.div_euclid(NODE * DIM as i32))).collect();
-        let needed = dense as u64 * DENSE_BYTES
-            + positions.len() as u64 * POSITION_BYTES
+        let needed = dense as u64 * BYTES_PER_DENSE_BLOCK
+            + positions.len() as u64 * BYTES_PER_POSITION
             + nodes.len() as u64 * size_of::<[u32; NODE_BLOCKS]>() as u64
             + counts.iter().product::<usize>() as u64 * size_of::<u32>() as u64;
         ctx.allow(WHAT, needed)?;
-        let filled: Vec<Option<Filled>> = ctx.pool().install(|| {
+        let samples_of_blocks: Vec<Option<BlockSamples>> = ctx.pool().install(|| {
             let fill = |position: &Origin| {
                 ctx.check()?;
-                Ok(fill(*position, &of_position, extinction))
+                Ok(samples_at(*position, &by_position, extinction))
             };
             positions.par_iter().map(fill).collect::<Result<_>>()
         })?;
@@ -166,34 +171,38 @@ impl Fog {
             table: vec![NONE; counts.iter().product()],
             nodes: Vec::new(),
             blocks: Vec::new(),
-            // Most fogs have at most one value that whole blocks share.
+            // Most fogs have at most one value of uniform blocks.
             samples: Vec::with_capacity(
-                1 + filled.iter().flatten().filter(|filled| matches!(filled, Filled::Dense(_))).count(),
+                1 + samples_of_blocks
+                    .iter()
+                    .flatten()
+                    .filter(|samples| matches!(samples, BlockSamples::Dense(_)))
+                    .count(),
             ),
             bounds: None,
         };
-        let mut even: HashMap<u32, u32> = HashMap::new();
-        for (position, filled) in positions.into_iter().zip(filled) {
+        let mut uniform: HashMap<u32, u32> = HashMap::new();
+        for (position, samples) in positions.into_iter().zip(samples_of_blocks) {
             let next = fog.samples.len() as u32;
-            let samples = match filled {
+            let samples = match samples {
                 None => continue,
-                Some(Filled::Even(value)) => *even.entry(value.to_bits()).or_insert_with(|| {
+                Some(BlockSamples::Uniform(value)) => *uniform.entry(value.to_bits()).or_insert_with(|| {
                     fog.samples.push([value; EDGE * EDGE * EDGE]);
                     next
                 }),
-                Some(Filled::Dense(samples)) => {
+                Some(BlockSamples::Dense(samples)) => {
                     fog.samples.push(*samples);
                     next
                 }
             };
-            fog.put(FogBlock { origin: position, samples });
+            fog.insert(FogBlock { origin: position, samples });
         }
         fog.bounds = fog.find_bounds();
         Ok(fog)
     }
 
     /// Adds a block.
-    fn put(&mut self, block: FogBlock) {
+    fn insert(&mut self, block: FogBlock) {
         let position = block.origin.map(|at| at.div_euclid(DIM as i32));
         let (Some(slot), within) = self.slot(position) else { return };
         if self.table[slot] == NONE {
@@ -204,7 +213,7 @@ impl Fog {
         self.blocks.push(block);
     }
 
-    /// Position of a block's node in the table (none outside the box), and of the block in the node.
+    /// Index of a block's node in the table (none outside the box), and of the block in the node.
     fn slot(&self, position: [i32; 3]) -> (Option<usize>, usize) {
         let [x, y, z] = [0, 1, 2].map(|axis| i64::from(position[axis].div_euclid(NODE) - self.low[axis]));
         let inside = [x, y, z].iter().zip(&self.counts).all(|(at, count)| (0..*count as i64).contains(at));
@@ -214,13 +223,13 @@ impl Fog {
     }
 
     /// Contents of a block position, in blocks.
-    pub(super) fn look(&self, position: [i32; 3]) -> Look {
-        let (Some(slot), within) = self.slot(position) else { return Look::Outside };
+    pub(super) fn lookup(&self, position: [i32; 3]) -> Lookup {
+        let (Some(slot), within) = self.slot(position) else { return Lookup::Outside };
         match self.table[slot] {
-            NONE => Look::EmptyNode,
+            NONE => Lookup::EmptyNode,
             node => match self.nodes[node as usize][within] {
-                NONE => Look::Empty,
-                block => Look::Block(block as usize),
+                NONE => Lookup::Empty,
+                block => Lookup::Block(block as usize),
             },
         }
     }
@@ -258,7 +267,7 @@ impl Fog {
     }
 
     /// Maximum extinction (1/m) of the samples of a block around a position, less than `reach` voxels away along each axis.
-    pub(super) fn most_near(&self, block: usize, local: [i32; 3], reach: i32) -> f32 {
+    pub(super) fn max_near(&self, block: usize, local: [i32; 3], reach: i32) -> f32 {
         let samples = &self.samples[self.blocks[block].samples as usize];
         let [x, y, z] =
             local.map(|at| (at - reach + 1).max(0) as usize..=((at + reach - 1) as usize).min(DIM));
@@ -279,10 +288,10 @@ impl Fog {
     }
 
     fn find_bounds(&self) -> Option<(DVec3, DVec3)> {
-        let most = self.samples.iter().flat_map(|samples| samples.iter().copied()).fold(0.0, f32::max);
+        let max = self.samples.iter().flat_map(|samples| samples.iter().copied()).fold(0.0, f32::max);
         let boxes = self.blocks.iter().flat_map(|block| {
             let samples = &self.samples[block.samples as usize];
-            let seen = (0..samples.len()).filter(|n| samples[*n] >= SEEN * most && samples[*n] > 0.0);
+            let seen = (0..samples.len()).filter(|n| samples[*n] >= VISIBLE_SHARE * max && samples[*n] > 0.0);
             let voxel = |n: usize| [n / (EDGE * EDGE), n / EDGE % EDGE, n % EDGE];
             let all = seen.map(|n| DVec3::from(voxel(n).map(|at| at as f64)));
             let corner = DVec3::from(block.origin.map(f64::from));
@@ -297,7 +306,7 @@ impl Fog {
 }
 
 /// Contents of a block position.
-pub(super) enum Look {
+pub(super) enum Lookup {
     /// A block that is not empty, by its index.
     Block(usize),
     /// Nothing.
@@ -308,7 +317,7 @@ pub(super) enum Look {
     Outside,
 }
 
-/// The box of nodes around some blocks and the positions before them: its minimum node and the number of nodes along each axis.
+/// The box of nodes around some blocks and the positions just below them: its minimum node and the number of nodes along each axis.
 fn node_box(parts: &[(Origin, Part<'_>)]) -> Result<([i32; 3], [usize; 3])> {
     let too_far = || Error::argument("has densities too far apart, or too far from its origin, to be drawn");
     let ends = parts.iter().map(|(origin, _)| (*origin, *origin)).reduce(|(low, high), (at, _)| {
@@ -316,19 +325,19 @@ fn node_box(parts: &[(Origin, Part<'_>)]) -> Result<([i32; 3], [usize; 3])> {
         (pick(i32::min, low), pick(i32::max, high))
     });
     let Some((low, high)) = ends else { return Ok(([0; 3], [0; 3])) };
-    if low.iter().chain(&high).any(|at| !(-FARTHEST..FARTHEST).contains(at)) {
+    if low.iter().chain(&high).any(|at| !(-COORDINATE_LIMIT..COORDINATE_LIMIT).contains(at)) {
         return Err(too_far());
     }
     let node = |at: i32| at.div_euclid(NODE * DIM as i32);
     let first = low.map(|at| node(at - DIM as i32));
     let counts = [0, 1, 2].map(|axis| (node(high[axis]) - first[axis] + 1) as usize);
-    if counts.iter().map(|count| *count as f64).product::<f64>() > MOST_NODES {
+    if counts.iter().map(|count| *count as f64).product::<f64>() > MAX_NODES {
         return Err(too_far());
     }
     Ok((first, counts))
 }
 
-/// The block positions that may not be empty: those of the parts and those before them, whose last cells end there.
+/// The block positions that may not be empty: those of the parts, and those just below them, whose last samples are the parts' first ones.
 fn positions(parts: &[(Origin, Part<'_>)]) -> Vec<Origin> {
     let before = |n: usize, origin: &Origin| [0, 1, 2].map(|axis| origin[axis] - (n >> axis & 1) as i32 * 8);
     let mut positions: Vec<Origin> =
@@ -339,29 +348,29 @@ fn positions(parts: &[(Origin, Part<'_>)]) -> Vec<Origin> {
 }
 
 /// The block at a position and the next ones along the axes.
-fn near<'a>(position: Origin, parts: &HashMap<Origin, Part<'a>>) -> [Option<Part<'a>>; 8] {
+fn neighbours<'a>(position: Origin, parts: &HashMap<Origin, Part<'a>>) -> [Option<Part<'a>>; 8] {
     std::array::from_fn(|n| {
         parts.get(&[0, 1, 2].map(|axis| position[axis] + (n >> axis & 1) as i32 * DIM as i32)).copied()
     })
 }
 
-/// The density of all samples of the block at a position; none if they may differ.
-fn even_at(position: Origin, parts: &HashMap<Origin, Part<'_>>) -> Option<f32> {
-    let near = near(position, parts);
-    let Some(Part::Even(first)) = near[0] else { return None };
-    let is_same = |part: &Option<Part<'_>>| matches!(part, Some(Part::Even(other)) if *other == first);
-    near.iter().all(is_same).then_some(first)
+/// The density of all samples of the block at a position if it is uniform; none if they may differ.
+fn uniform_density(position: Origin, parts: &HashMap<Origin, Part<'_>>) -> Option<f32> {
+    let neighbours = neighbours(position, parts);
+    let Some(Part::Uniform(first)) = neighbours[0] else { return None };
+    let is_same = |part: &Option<Part<'_>>| matches!(part, Some(Part::Uniform(other)) if *other == first);
+    neighbours.iter().all(is_same).then_some(first)
 }
 
-/// The samples of the block at a position; none when all are 0.
-fn fill(position: Origin, parts: &HashMap<Origin, Part<'_>>, extinction: f64) -> Option<Filled> {
-    let value = |density: f32| (f64::from(density) * extinction).min(MOST_EXTINCTION) as f32;
-    if let Some(density) = even_at(position, parts) {
-        return Some(value(density)).filter(|value| *value > 0.0).map(Filled::Even);
+/// The samples of the block at a position; none if all are 0.
+fn samples_at(position: Origin, parts: &HashMap<Origin, Part<'_>>, extinction: f64) -> Option<BlockSamples> {
+    let value = |density: f32| (f64::from(density) * extinction).min(MAX_EXTINCTION) as f32;
+    if let Some(density) = uniform_density(position, parts) {
+        return Some(value(density)).filter(|value| *value > 0.0).map(BlockSamples::Uniform);
     }
-    let near = near(position, parts);
+    let neighbours = neighbours(position, parts);
     let mut samples = Box::new([0.0; EDGE * EDGE * EDGE]);
-    for (n, part) in near.iter().enumerate().filter_map(|(n, part)| part.map(|part| (n, part))) {
+    for (n, part) in neighbours.iter().enumerate().filter_map(|(n, part)| part.map(|part| (n, part))) {
         // The block itself gives 8 samples along an axis, the next one its first.
         let range = |axis: usize| if n >> axis & 1 == 0 { 0..DIM } else { 0..1 };
         let shift = |axis: usize| if n >> axis & 1 == 0 { 0 } else { DIM };
@@ -374,5 +383,5 @@ fn fill(position: Origin, parts: &HashMap<Origin, Part<'_>>, extinction: f64) ->
             }
         }
     }
-    samples.iter().any(|sample| *sample > 0.0).then_some(Filled::Dense(samples))
+    samples.iter().any(|sample| *sample > 0.0).then_some(BlockSamples::Dense(samples))
 }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::blocks::Fog;
-use super::walk::{Here, along, entry};
+use super::traversal::{FogPosition, first_entry, march};
 use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::DVec3;
@@ -16,21 +16,21 @@ const EDGE: usize = DIM / SPACING + 1;
 /// The light in a block; sample (x, y, z) lies at `(x * 5 + y) * 5 + z`.
 type Lattice = [Lit; EDGE * EDGE * EDGE];
 /// Maximum step (voxels) of rays towards the light.
-const STRIDE: f64 = 2.0;
+const MAX_STEP: f64 = 2.0;
 /// Optical depth beyond which no light arrives.
 const OPAQUE: f64 = 12.0;
 /// A block whose samples all have less sun and sky than this counts as dark.
 const DARK: f32 = 1.0e-4;
 /// Share of the sky's light that arrives in the thickest fog: it comes from the sides, scattered many times.
-const LEAST_SKY: f32 = 0.35;
+const MIN_SKY: f32 = 0.35;
 
 /// The light at a position, each as a share of the unobstructed light, 0 to 1.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lit {
     /// Sun that the fogs let through.
     pub sun: f32,
-    /// Sun that models and points do not hide.
-    pub open: f32,
+    /// Sun that models and points do not block.
+    pub unblocked: f32,
     /// Sky.
     pub sky: f32,
 }
@@ -40,7 +40,7 @@ pub(in crate::render) struct LitFogs<'a> {
     pub(super) fogs: &'a [Fog],
     /// Unit vector towards the sun.
     pub(super) sun: DVec3,
-    /// For each fog and block the index of its light.
+    /// For each fog and block the index of its lattice.
     of_block: Vec<Vec<u32>>,
     /// The first one is for dark blocks.
     lattices: Vec<Lattice>,
@@ -68,7 +68,7 @@ impl<'a> LitFogs<'a> {
             Ok(lattice(fogs, *fog, *block, sun, &blocked))
         };
         let lit: Vec<Option<Box<Lattice>>> = all.par_iter().map(light).collect::<Result<_>>()?;
-        let dark = Lit { sun: 0.0, open: 0.0, sky: LEAST_SKY };
+        let dark = Lit { sun: 0.0, unblocked: 0.0, sky: MIN_SKY };
         let mut lattices = Vec::with_capacity(1 + lit.iter().flatten().count());
         lattices.push([dark; EDGE * EDGE * EDGE]);
         let mut of_block: Vec<Vec<u32>> = vec![Vec::new(); fogs.len()];
@@ -82,19 +82,19 @@ impl<'a> LitFogs<'a> {
     /// Share of the sun's light, 0 to 1, that the fogs transmit to a point (m); `toward` is the direction of the sun (a unit vector).
     pub fn sunlight(&self, point: DVec3, toward: DVec3) -> f64 {
         // Where the ray enters the first fog, the light accounts for that fog and all behind it.
-        entry(self.fogs, (point, toward)).map_or(1.0, |here| f64::from(self.at(here).sun))
+        first_entry(self.fogs, (point, toward)).map_or(1.0, |position| f64::from(self.at(position).sun))
     }
 
     /// The light at a position.
     #[inline]
-    pub(super) fn at(&self, here: Here) -> Lit {
-        let lattice = &self.lattices[self.of_block[here.fog][here.block] as usize];
-        let scaled = here.local.map(|at| at / SPACING as f32);
+    pub(super) fn at(&self, position: FogPosition) -> Lit {
+        let lattice = &self.lattices[self.of_block[position.fog][position.block] as usize];
+        let scaled = position.local.map(|at| at / SPACING as f32);
         let whole = scaled.map(|at| (at as usize).min(EDGE - 2));
         let [x, y, z] = [0, 1, 2].map(|axis| scaled[axis] - whole[axis] as f32);
         let mix = |a: Lit, b: Lit, part: f32| Lit {
             sun: a.sun + (b.sun - a.sun) * part,
-            open: a.open + (b.open - a.open) * part,
+            unblocked: a.unblocked + (b.unblocked - a.unblocked) * part,
             sky: a.sky + (b.sky - a.sky) * part,
         };
         let corner = (whole[0] * EDGE + whole[1]) * EDGE + whole[2];
@@ -114,30 +114,30 @@ fn lattice(
 ) -> Option<Box<Lattice>> {
     let of = &fogs[fog];
     let corner = DVec3::from(of.blocks()[block].origin.map(f64::from));
-    // Rays towards the sun start slightly off the point, so that fog on the ground is not in the ground's shadow.
-    let skin = sun * (SPACING as f64 * of.placement().cell());
+    // Shadow rays start slightly off the point, so that fog on the ground is not in the ground's shadow.
+    let shadow_bias = sun * (SPACING as f64 * of.placement().cell());
     let lit = |n: usize| {
-        let position = [n / (EDGE * EDGE), n / EDGE % EDGE, n % EDGE].map(|at| (at * SPACING) as i32);
-        let point = of.placement().to_world(corner + DVec3::from(position.map(f64::from)));
-        let sun_left = left(fogs, point, sun);
+        let voxel = [n / (EDGE * EDGE), n / EDGE % EDGE, n % EDGE].map(|at| (at * SPACING) as i32);
+        let point = of.placement().to_world(corner + DVec3::from(voxel.map(f64::from)));
+        let sun_left = transmittance(fogs, point, sun);
         // Where there is no fog around, only [`LitFogs::sunlight`] asks for light.
-        let is_seen = sun_left > DARK && of.most_near(block, position, SPACING as i32) > 0.0;
-        let open = if is_seen && blocked(point + skin, sun) { 0.0 } else { 1.0 };
-        Lit { sun: sun_left, open, sky: left(fogs, point, DVec3::y()) }
+        let is_visible = sun_left > DARK && of.max_near(block, voxel, SPACING as i32) > 0.0;
+        let unblocked = if is_visible && blocked(point + shadow_bias, sun) { 0.0 } else { 1.0 };
+        Lit { sun: sun_left, unblocked, sky: transmittance(fogs, point, DVec3::y()) }
     };
     let mut lattice: Box<Lattice> = Box::new(std::array::from_fn(lit));
     if lattice.iter().all(|lit| lit.sun < DARK && lit.sky < DARK) {
         return None;
     }
-    lattice.iter_mut().for_each(|lit| lit.sky = LEAST_SKY + (1.0 - LEAST_SKY) * lit.sky.sqrt());
+    lattice.iter_mut().for_each(|lit| lit.sky = MIN_SKY + (1.0 - MIN_SKY) * lit.sky.sqrt());
     Some(lattice)
 }
 
 /// Share of the light, 0 to 1, that arrives from far away at a point (m) from a direction (a unit vector).
-fn left(fogs: &[Fog], point: DVec3, toward: DVec3) -> f32 {
+fn transmittance(fogs: &[Fog], point: DVec3, toward: DVec3) -> f32 {
     let mut depth = 0.0f64;
-    along(fogs, (point, toward), f64::INFINITY, STRIDE, |from, to, here| {
-        let extinction: f32 = here.iter().map(|here| fogs[here.fog].extinction(here.block, here.local)).sum();
+    march(fogs, (point, toward), f64::INFINITY, MAX_STEP, |from, to, positions| {
+        let extinction: f32 = positions.iter().map(|at| fogs[at.fog].extinction(at.block, at.local)).sum();
         depth += f64::from(extinction) * (to - from);
         depth < OPAQUE
     });

@@ -1,21 +1,21 @@
-//! Fog along view rays: how much it hides of what is behind it, and the light that it adds.
+//! Fog along view rays: its transmittance, and the light that it adds.
 //!
 //! Light scattered once comes from the sun through the fog (Henyey and Greenstein 1941). Light scattered more often is added as one wider
 //! and weaker lobe that reaches deeper (after Wrenninge, Kulla and Lundqvist 2013), since the crystals of powder snow absorb next to
 //! nothing. The sky lights the fog from all sides.
 
 use super::light::LitFogs;
-use super::walk::along;
+use super::traversal;
 use crate::geometry::DVec3;
 use crate::render::camera::{Camera, Size};
 use crate::render::shade::{Colour, SUN, SURROUNDINGS};
 
 /// Maximum step (voxels).
-const STRIDE: f64 = 1.0;
-/// Mean cosine of the angle by which light is scattered: a little forward.
-const FORWARD: f64 = 0.3;
-/// The lobe of light scattered several times, relative to that of light scattered once.
-const SEVERAL: f64 = 0.9;
+const MAX_STEP: f64 = 1.0;
+/// Mean cosine of the scattering angle: slightly forward.
+const ASYMMETRY: f64 = 0.3;
+/// Weight of light scattered several times, relative to that of light scattered once.
+const MULTIPLE_SCATTERING: f64 = 0.9;
 /// A fog that transmits less than this is opaque.
 const OPAQUE: f64 = 0.002;
 
@@ -23,19 +23,18 @@ const OPAQUE: f64 = 0.002;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::render) struct Veil {
     /// Share of the light that passes, 0 to 1.
-    pub through: f64,
+    pub transmittance: f64,
     /// Light that the fog adds.
     pub light: Colour,
 }
 
 impl Veil {
     /// The veil without fog.
-    pub const NONE: Self = Self { through: 1.0, light: Colour::new(0.0, 0.0, 0.0) };
+    pub const NONE: Self = Self { transmittance: 1.0, light: Colour::new(0.0, 0.0, 0.0) };
 }
 
 impl LitFogs<'_> {
-    /// Whether one ray through the middle of a pixel can stand for all its samples: no voxel is smaller than a pixel at the middle of its
-    /// fog.
+    /// Whether one ray through the middle of a pixel suffices for all its samples: no voxel is smaller than a pixel at the middle of its fog.
     pub fn is_smooth(&self, camera: &Camera, size: Size) -> bool {
         let pixel = 2.0 * libm::tan(camera.fov_deg.to_radians() * 0.5) / f64::from(size.height);
         let is_smooth =
@@ -45,45 +44,48 @@ impl LitFogs<'_> {
             .all(|fog| fog.bounds().is_none_or(|bounds| is_smooth(bounds, fog.placement().cell())))
     }
 
-    /// The veils along a ray (a unit vector) from a point (m), in front of things at some distances (m).
+    /// The effects of the fogs along a ray (a unit vector) from a point (m), up to each of some distances (m).
     pub fn veils<const N: usize>(&self, eye: DVec3, toward: DVec3, distances: [f64; N]) -> [Veil; N] {
         let mut order: [usize; N] = std::array::from_fn(|n| n);
         order.sort_unstable_by(|a, b| distances[*a].total_cmp(&distances[*b]).then(a.cmp(b)));
         let mut veils = [Veil::NONE; N];
         let Some(farthest) = order.last().map(|last| distances[*last]) else { return veils };
-        let lobe = lobe(self.sun.dot(&toward));
-        let mut march = March { through: 1.0, sun: 0.0, sky: 0.0 };
-        let mut rest = &order[..];
-        along(self.fogs, (eye, toward), farthest, STRIDE, |from, to, here| {
+        let phase = phase(self.sun.dot(&toward));
+        let mut march = March { transmittance: 1.0, sun: 0.0, sky: 0.0 };
+        let mut remaining = &order[..];
+        traversal::march(self.fogs, (eye, toward), farthest, MAX_STEP, |from, to, positions| {
             let (mut extinction, mut sun, mut sky) = (0.0f64, 0.0, 0.0);
-            for here in here {
-                let of = f64::from(self.fogs[here.fog].extinction(here.block, here.local));
-                if of > 0.0 {
-                    let lit = self.at(*here);
+            for position in positions {
+                let fog_extinction =
+                    f64::from(self.fogs[position.fog].extinction(position.block, position.local));
+                if fog_extinction > 0.0 {
+                    let lit = self.at(*position);
                     // The fourth root is the transmittance of a quarter of the path.
                     let deep = f64::from(lit.sun).sqrt().sqrt();
-                    sun += of * f64::from(lit.open) * (lobe * f64::from(lit.sun) + SEVERAL * deep);
-                    sky += of * f64::from(lit.sky);
-                    extinction += of;
+                    sun += fog_extinction
+                        * f64::from(lit.unblocked)
+                        * (phase * f64::from(lit.sun) + MULTIPLE_SCATTERING * deep);
+                    sky += fog_extinction * f64::from(lit.sky);
+                    extinction += fog_extinction;
                 }
             }
             let to_end = |march: &March, end: f64| match extinction > 0.0 {
                 true => march.after(extinction * (end - from), sun / extinction, sky / extinction),
                 false => *march,
             };
-            while let [next, others @ ..] = rest
+            while let [next, others @ ..] = remaining
                 && distances[*next] < to
             {
                 veils[*next] = to_end(&march, distances[*next].max(from)).veil();
-                rest = others;
+                remaining = others;
             }
             march = to_end(&march, to);
-            march.through > OPAQUE
+            march.transmittance > OPAQUE
         });
-        if march.through <= OPAQUE {
-            march.through = 0.0;
+        if march.transmittance <= OPAQUE {
+            march.transmittance = 0.0;
         }
-        rest.iter().for_each(|n| veils[*n] = march.veil());
+        remaining.iter().for_each(|n| veils[*n] = march.veil());
         veils
     }
 }
@@ -92,7 +94,7 @@ impl LitFogs<'_> {
 #[derive(Clone, Copy)]
 struct March {
     /// Share of the light that passes so far.
-    through: f64,
+    transmittance: f64,
     /// Light of the sun and of the sky added so far, relative to their full strength.
     sun: f64,
     sky: f64,
@@ -101,21 +103,25 @@ struct March {
 impl March {
     /// The state after a segment with this optical depth and these sources of light.
     fn after(self, depth: f64, sun: f64, sky: f64) -> Self {
-        let left = libm::exp(-depth);
-        let added = self.through * (1.0 - left);
-        Self { through: self.through * left, sun: self.sun + added * sun, sky: self.sky + added * sky }
+        let passed = libm::exp(-depth);
+        let added = self.transmittance * (1.0 - passed);
+        Self {
+            transmittance: self.transmittance * passed,
+            sun: self.sun + added * sun,
+            sky: self.sky + added * sky,
+        }
     }
 
     fn veil(self) -> Veil {
         // A white surface that faces the sun has the radiance E / pi = `SUN`; light that is scattered evenly into all
         // directions has E / (4 pi).
-        Veil { through: self.through, light: SUN * (0.25 * self.sun) + SURROUNDINGS * self.sky }
+        Veil { transmittance: self.transmittance, light: SUN * (0.25 * self.sun) + SURROUNDINGS * self.sky }
     }
 }
 
 /// Light that is scattered by an angle with this cosine, relative to the mean over all angles.
-fn lobe(cosine: f64) -> f64 {
-    let g = FORWARD;
+fn phase(cosine: f64) -> f64 {
+    let g = ASYMMETRY;
     let spread = 1.0 + g * g - 2.0 * g * cosine;
     (1.0 - g * g) / (spread * spread.sqrt())
 }
@@ -152,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slab_lets_through_what_the_law_of_beer_and_lambert_says() {
+    fn the_transmittance_of_a_slab_follows_beer_and_lambert() {
         let ctx = ctx(1);
         let fogs = [slab(&ctx, &[1.0; 512], &[u64::MAX; 8])];
         let lit = lit(&ctx, &fogs);
@@ -162,9 +168,13 @@ mod tests {
             let thickness = 16.0 * CELL / toward.x;
             // Behind the slab, and in the middle of it.
             let [behind, inside, before] = lit.veils(eye, toward, [f64::INFINITY, 3.0, 1.0]);
-            for (veil, way) in [(behind, thickness), (inside, 0.5 * thickness), (before, 0.0)] {
-                let expected = libm::exp(-EXTINCTION * way);
-                assert!((veil.through / expected - 1.0).abs() < 0.01, "{} {expected}", veil.through);
+            for (veil, path) in [(behind, thickness), (inside, 0.5 * thickness), (before, 0.0)] {
+                let expected = libm::exp(-EXTINCTION * path);
+                assert!(
+                    (veil.transmittance / expected - 1.0).abs() < 0.01,
+                    "{} {expected}",
+                    veil.transmittance
+                );
             }
             assert_eq!(before, Veil::NONE);
             assert!(behind.light.x > inside.light.x && inside.light.x > 0.1);
@@ -176,7 +186,7 @@ mod tests {
         let ctx = ctx(1);
         let even = |density: f32| {
             let positions = (0..2).flat_map(|x| (0..8).flat_map(move |y| (0..8).map(move |z| [x, y, z])));
-            fog(&ctx, positions.map(|at| (at.map(|at| 8 * at), Part::Even(density))).collect())
+            fog(&ctx, positions.map(|at| (at.map(|at| 8 * at), Part::Uniform(density))).collect())
         };
         let one = [even(0.75)];
         let three = [even(0.25), slab(&ctx, &[0.25; 512], &[u64::MAX; 8]), even(0.25)];
@@ -185,7 +195,10 @@ mod tests {
         let [of_one, of_three] =
             [&one[..], &three].map(|fogs| lit(&ctx, fogs).veils(eye, toward, [3.1, 9.0]));
         for (a, b) in of_one.iter().zip(&of_three) {
-            assert!((a.through - b.through).abs() < 1e-5 && (a.light - b.light).norm() < 1e-4, "{a:?} {b:?}");
+            assert!(
+                (a.transmittance - b.transmittance).abs() < 1e-5 && (a.light - b.light).norm() < 1e-4,
+                "{a:?} {b:?}"
+            );
         }
     }
 
@@ -212,18 +225,18 @@ mod tests {
         }
         let axes = [DVec3::x(), DVec3::y(), DVec3::z()];
         let placement = Placement::new(DVec3::zeros(), axes).unwrap();
-        let far = vec![([0; 3], Part::Even(1.0)), ([1 << 28; 3], Part::Even(1.0))];
+        let far = vec![([0; 3], Part::Uniform(1.0)), ([1 << 28; 3], Part::Uniform(1.0))];
         assert!(Fog::of_parts(&ctx, placement, far, 1.0).is_err());
-        let edge = vec![([i32::MIN; 3], Part::Even(1.0))];
+        let edge = vec![([i32::MIN; 3], Part::Uniform(1.0))];
         assert!(Fog::of_parts(&ctx, placement, edge, 1.0).is_err());
         assert!(Placement::new(DVec3::zeros(), [DVec3::x(), DVec3::x(), DVec3::z()]).is_none());
     }
 
     #[test]
-    fn the_lobe_sends_on_what_it_gets() {
+    fn the_phase_function_conserves_energy() {
         let steps = 20_000;
-        let mean: f64 = (0..steps).map(|n| lobe((f64::from(n) + 0.5) / f64::from(steps) * 2.0 - 1.0)).sum();
+        let mean: f64 = (0..steps).map(|n| phase((f64::from(n) + 0.5) / f64::from(steps) * 2.0 - 1.0)).sum();
         assert!((mean / f64::from(steps) - 1.0).abs() < 1e-6);
-        assert!(lobe(1.0) > lobe(0.0) && lobe(0.0) > lobe(-1.0));
+        assert!(phase(1.0) > phase(0.0) && phase(0.0) > phase(-1.0));
     }
 }

@@ -10,7 +10,7 @@ use super::camera::Size;
 use palette::Palette;
 
 /// Minimum time of a frame (1/100 s): most programs show shorter ones for a tenth of a second.
-const LEAST_DELAY: u16 = 2;
+const MIN_DELAY: u16 = 2;
 
 /// A GIF file that is written frame by frame; it loops forever.
 pub struct Gif<'a, W: Write> {
@@ -25,38 +25,39 @@ impl<'a, W: Write> Gif<'a, W> {
     /// Begins a file.
     ///
     /// # Errors
-    /// A size of more than 65,535 pixels along an edge; what `out` reports.
+    /// A size of more than 65,535 pixels along an edge; errors of `out`.
     pub fn new(out: W, size: Size, palette: &'a Palette) -> Result<Self> {
         let edge = |pixels: u32| {
             u16::try_from(pixels).map_err(|_| Error::other("a GIF has at most 65,535 pixels along an edge"))
         };
         let edges = [edge(size.width)?, edge(size.height)?];
-        // One more colour stands for unchanged pixels.
+        // The colour after the palette's marks unchanged pixels.
         let colours: Vec<u8> = palette.colours().iter().copied().chain([[0; 3]]).flatten().collect();
-        let mut encoder = Encoder::new(out, edges[0], edges[1], &colours).map_err(failed)?;
-        encoder.set_repeat(Repeat::Infinite).map_err(failed)?;
+        let mut encoder = Encoder::new(out, edges[0], edges[1], &colours).map_err(io_error)?;
+        encoder.set_repeat(Repeat::Infinite).map_err(io_error)?;
         Ok(Self { encoder, size: edges, palette, before: Vec::new() })
     }
 
     /// Adds a frame by the indices of its colours ([`Palette::indices`]), shown for `delay` hundredths of a second.
     ///
     /// # Errors
-    /// Another number of pixels than the file's; what the file reports.
+    /// Another number of pixels than the file's; errors of the file.
     pub fn add(&mut self, indices: Vec<u8>, delay: u16) -> Result<()> {
         let [width, height] = self.size.map(usize::from);
         if indices.len() != width * height {
             return Err(Error::other("a frame of a GIF has another size than the others"));
         }
-        let same = self.palette.colours().len() as u8;
+        let unchanged = self.palette.colours().len() as u8;
         let is_first = self.before.is_empty();
         let [left, top, right, bottom] =
-            if is_first { [0, 0, width, height] } else { changed(&self.before, &indices, width) };
+            if is_first { [0, 0, width, height] } else { changed_box(&self.before, &indices, width) };
         let rows = (top..bottom).flat_map(|y| (left..right).map(move |x| y * width + x));
-        let pixel = |at: usize| if !is_first && self.before[at] == indices[at] { same } else { indices[at] };
+        let pixel =
+            |at: usize| if !is_first && self.before[at] == indices[at] { unchanged } else { indices[at] };
         let frame = Frame {
             delay,
             dispose: DisposalMethod::Keep,
-            transparent: (!is_first).then_some(same),
+            transparent: (!is_first).then_some(unchanged),
             left: left as u16,
             top: top as u16,
             width: (right - left) as u16,
@@ -64,7 +65,7 @@ impl<'a, W: Write> Gif<'a, W> {
             buffer: rows.map(pixel).collect::<Vec<u8>>().into(),
             ..Frame::default()
         };
-        self.encoder.write_frame(&frame).map_err(failed)?;
+        self.encoder.write_frame(&frame).map_err(io_error)?;
         self.before = indices;
         Ok(())
     }
@@ -72,13 +73,13 @@ impl<'a, W: Write> Gif<'a, W> {
     /// Ends the file.
     ///
     /// # Errors
-    /// What the file reports.
+    /// Errors of the file.
     pub fn finish(self) -> Result<()> {
-        self.encoder.into_inner().map(drop).map_err(failed)
+        self.encoder.into_inner().map(drop).map_err(io_error)
     }
 }
 
-fn failed(error: EncodingError) -> Error {
+fn io_error(error: EncodingError) -> Error {
     match error {
         EncodingError::Io(error) => error,
         other => Error::other(other.to_string()),
@@ -86,7 +87,7 @@ fn failed(error: EncodingError) -> Error {
 }
 
 /// The box of the differences between two frames (left, top, right, bottom; the last two exclusive); at least one pixel.
-fn changed(before: &[u8], after: &[u8], width: usize) -> [usize; 4] {
+fn changed_box(before: &[u8], after: &[u8], width: usize) -> [usize; 4] {
     let mut edges = [width, usize::MAX, 0, 0];
     for (y, (old, new)) in before.chunks(width).zip(after.chunks(width)).enumerate() {
         let is_other = |x: &usize| old[*x] != new[*x];
@@ -98,19 +99,19 @@ fn changed(before: &[u8], after: &[u8], width: usize) -> [usize; 4] {
     if edges[3] == 0 { [0, 0, 1, 1] } else { edges }
 }
 
-/// How long each of some frames of a shot is shown (1/100 s), so that they play at `fps` frames of the shot per second, even with frames
-/// left out between them. Start times are rounded, so that the error does not add up. The last frame is shown as long as the one before it.
-/// None is shown for less than 2, which is what programs play.
+/// The delay (1/100 s) of each of some frames of a shot, so that they play at `fps` frames of the shot per second, even if frames between
+/// them are left out. Start times are rounded, not delays, so that the error does not add up. The last frame has the delay of the one
+/// before it. Delays are at least 2, as many programs do not play shorter ones.
 pub fn delays(frames: &[i32], fps: f64) -> Vec<u16> {
     let gap = |pair: &[i32]| i64::from(pair[1]) - i64::from(pair[0]);
     let gaps: Vec<i64> = frames.windows(2).map(gap).collect();
     let all = gaps.iter().chain([gaps.last().unwrap_or(&1)]);
-    let begins = |count: i64| (count as f64 * 100.0 / fps).round();
+    let start_time = |count: i64| (count as f64 * 100.0 / fps).round();
     let mut at = 0;
     let delay = |gap: &i64| {
-        let begin = begins(at);
+        let begin = start_time(at);
         at += gap;
-        (begins(at) - begin).clamp(f64::from(LEAST_DELAY), f64::from(u16::MAX)) as u16
+        (start_time(at) - begin).clamp(f64::from(MIN_DELAY), f64::from(u16::MAX)) as u16
     };
     all.take(frames.len()).map(delay).collect()
 }
@@ -140,7 +141,7 @@ mod tests {
         let before = [0u8; 12];
         let mut after = before;
         (after[5], after[10]) = (1, 2);
-        assert_eq!(changed(&before, &after, 4), [1, 1, 3, 3]);
-        assert_eq!(changed(&before, &before, 4), [0, 0, 1, 1]);
+        assert_eq!(changed_box(&before, &after, 4), [1, 1, 3, 3]);
+        assert_eq!(changed_box(&before, &before, 4), [0, 0, 1, 1]);
     }
 }

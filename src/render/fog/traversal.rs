@@ -1,11 +1,11 @@
-//! Walks along a ray from block to block, skipping empty blocks and nodes (Amanatides and Woo 1987, on two levels).
+//! Traverses the blocks along a ray, skipping empty blocks and nodes (Amanatides and Woo 1987, on two levels).
 
-use super::blocks::{Fog, Look, NODE};
+use super::blocks::{Fog, Lookup, NODE};
 use crate::geometry::DVec3;
 use crate::numeric::blocks::DIM;
 
 /// State of a ray that passes through a fog.
-struct Walk<'a> {
+struct Traversal<'a> {
     fog: &'a Fog,
     /// Its origin, in voxels, and voxels per metre along it.
     origin: DVec3,
@@ -19,15 +19,15 @@ struct Walk<'a> {
     end: f64,
 }
 
-/// A part of a ray (m) in one block.
+/// The segment of a ray in one block (distances along the ray, m).
 #[derive(Clone, Copy)]
-struct Stretch {
+struct Segment {
     from: f64,
     to: f64,
     block: usize,
 }
 
-impl<'a> Walk<'a> {
+impl<'a> Traversal<'a> {
     /// From a point (m) in a direction (a unit vector), at most to `end` (m); none where the ray misses the fog.
     fn new(fog: &'a Fog, from: DVec3, toward: DVec3, end: f64) -> Option<Self> {
         let [origin, direction] = fog.placement().ray(from, toward);
@@ -45,18 +45,18 @@ impl<'a> Walk<'a> {
             enter = enter.max(a.min(b));
             leave = leave.min(a.max(b));
         }
-        // The box of a fog without blocks is empty, and contains no position to settle at.
+        // The box of a fog without blocks contains no block position.
         if enter >= leave || low == high {
             return None;
         }
-        let mut walk =
+        let mut traversal =
             Self { fog, origin, direction, position: [0; 3], sides: [0.0; 3], at: enter, end: leave };
-        walk.settle([low, high.map(|at| at - 1)]);
-        Some(walk)
+        traversal.locate([low, high.map(|at| at - 1)]);
+        Some(traversal)
     }
 
-    /// Finds the block position at `at`, within a box of them (minimum and maximum).
-    fn settle(&mut self, [low, high]: [[i32; 3]; 2]) {
+    /// Sets the block position from `at`, clamped to a box (minimum and maximum).
+    fn locate(&mut self, [low, high]: [[i32; 3]; 2]) {
         for axis in 0..3 {
             let at = (self.origin[axis] + self.direction[axis] * self.at) / DIM as f64;
             // A number that does not fit an i32 becomes its maximum or minimum.
@@ -77,7 +77,7 @@ impl<'a> Walk<'a> {
 
     /// Steps to the next block position.
     fn step(&mut self) {
-        let axis = least(self.sides);
+        let axis = nearest_side(self.sides);
         self.at = self.at.max(self.sides[axis]);
         self.position[axis] += if self.direction[axis] > 0.0 { 1 } else { -1 };
         self.sides[axis] = self.side(axis, self.position[axis], 1);
@@ -87,25 +87,25 @@ impl<'a> Walk<'a> {
     fn leave_node(&mut self) {
         let low = self.position.map(|at| at.div_euclid(NODE) * NODE);
         let sides = [0, 1, 2].map(|axis| self.side(axis, low[axis], NODE));
-        let axis = least(sides);
+        let axis = nearest_side(sides);
         self.at = self.at.max(sides[axis]);
         let (mut first, mut last) = (low, low.map(|at| at + NODE - 1));
         let next = if self.direction[axis] > 0.0 { low[axis] + NODE } else { low[axis] - 1 };
         (first[axis], last[axis]) = (next, next);
-        self.settle([first, last]);
+        self.locate([first, last]);
     }
 
-    /// The next stretch in a block that is not empty.
-    fn next(&mut self) -> Option<Stretch> {
+    /// The next segment in a block that is not empty.
+    fn next(&mut self) -> Option<Segment> {
         while self.at < self.end {
-            match self.fog.look(self.position) {
-                Look::Outside => return None,
-                Look::Empty => self.step(),
-                Look::EmptyNode => self.leave_node(),
-                Look::Block(block) => {
+            match self.fog.lookup(self.position) {
+                Lookup::Outside => return None,
+                Lookup::Empty => self.step(),
+                Lookup::EmptyNode => self.leave_node(),
+                Lookup::Block(block) => {
                     let from = self.at;
                     self.step();
-                    return Some(Stretch { from, to: self.at.min(self.end), block });
+                    return Some(Segment { from, to: self.at.min(self.end), block });
                 }
             }
         }
@@ -113,13 +113,13 @@ impl<'a> Walk<'a> {
     }
 }
 
-fn least(sides: [f64; 3]) -> usize {
+fn nearest_side(sides: [f64; 3]) -> usize {
     (0..3).fold(0, |best, axis| if sides[axis] < sides[best] { axis } else { best })
 }
 
 /// A position in a fog.
 #[derive(Clone, Copy)]
-pub(super) struct Here {
+pub(super) struct FogPosition {
     /// Which fog.
     pub fog: usize,
     /// Which of its blocks.
@@ -128,69 +128,74 @@ pub(super) struct Here {
     pub local: [f32; 3],
 }
 
-/// A ray in one of the fogs: its current stretch.
-struct InFog<'a> {
+/// A ray in one of the fogs, with its current segment.
+struct RayInFog<'a> {
     index: usize,
-    walk: Walk<'a>,
-    stretch: Stretch,
+    traversal: Traversal<'a>,
+    segment: Segment,
 }
 
-impl InFog<'_> {
-    fn here(&self, at: f64) -> Here {
-        let block = self.stretch.block;
-        let corner = self.walk.fog.blocks()[block].origin;
+impl RayInFog<'_> {
+    fn position(&self, at: f64) -> FogPosition {
+        let block = self.segment.block;
+        let corner = self.traversal.fog.blocks()[block].origin;
         let local = [0, 1, 2].map(|axis| {
-            let voxel = self.walk.origin[axis] + self.walk.direction[axis] * at - f64::from(corner[axis]);
+            let voxel =
+                self.traversal.origin[axis] + self.traversal.direction[axis] * at - f64::from(corner[axis]);
             (voxel as f32).clamp(0.0, DIM as f32)
         });
-        Here { fog: self.index, block, local }
+        FogPosition { fog: self.index, block, local }
     }
 }
 
 /// The fogs that a ray from a point (m) in a direction (a unit vector) meets up to `end` (m).
-fn entered(fogs: &[Fog], (from, toward): (DVec3, DVec3), end: f64) -> impl Iterator<Item = InFog<'_>> {
+fn rays_in_fogs(
+    fogs: &[Fog],
+    (from, toward): (DVec3, DVec3),
+    end: f64,
+) -> impl Iterator<Item = RayInFog<'_>> {
     fogs.iter().enumerate().filter_map(move |(index, fog)| {
-        let mut walk = Walk::new(fog, from, toward, end)?;
-        walk.next().map(|stretch| InFog { index, walk, stretch })
+        let mut traversal = Traversal::new(fog, from, toward, end)?;
+        traversal.next().map(|segment| RayInFog { index, traversal, segment })
     })
 }
 
-/// Goes along a ray from a point (m) in a direction (a unit vector), at most to `end` (m), through everything that is not empty, in steps
+/// Marches along a ray from a point (m) in a direction (a unit vector), at most to `end` (m), through all blocks that are not empty, in steps
 /// of at most `stride` voxels. Calls `each` with the start and the end of a step (m) and the positions at its middle, one for each fog
 /// there, until it returns false.
-pub(super) fn along(
+pub(super) fn march(
     fogs: &[Fog],
     (from, toward): (DVec3, DVec3),
     end: f64,
     stride: f64,
-    mut each: impl FnMut(f64, f64, &[Here]) -> bool,
+    mut each: impl FnMut(f64, f64, &[FogPosition]) -> bool,
 ) {
-    let mut ways: Vec<InFog<'_>> = entered(fogs, (from, toward), end).collect();
-    let mut here = Vec::with_capacity(ways.len());
+    let mut rays: Vec<RayInFog<'_>> = rays_in_fogs(fogs, (from, toward), end).collect();
+    let mut positions = Vec::with_capacity(rays.len());
     let mut at = 0.0f64;
-    while !ways.is_empty() {
-        let first = ways.iter().map(|way| way.stretch.from).fold(f64::INFINITY, f64::min);
+    while !rays.is_empty() {
+        let first = rays.iter().map(|ray| ray.segment.from).fold(f64::INFINITY, f64::min);
         let from = first.max(at);
-        let is_in = |way: &&InFog<'_>| way.stretch.from <= from;
-        // As long as it stays in the same blocks.
-        let ends = ways.iter().map(|way| if is_in(&way) { way.stretch.to } else { way.stretch.from });
+        let is_in = |ray: &&RayInFog<'_>| ray.segment.from <= from;
+        // The steps up to `to` stay in the same blocks.
+        let ends = rays.iter().map(|ray| if is_in(&ray) { ray.segment.to } else { ray.segment.from });
         let to = ends.fold(f64::INFINITY, f64::min);
-        let voxels = ways.iter().filter(is_in).map(|way| way.walk.direction.norm()).fold(0.0, f64::max);
+        let voxels = rays.iter().filter(is_in).map(|ray| ray.traversal.direction.norm()).fold(0.0, f64::max);
         let count = ((to - from) * voxels / stride).ceil().max(1.0);
         let step = (to - from) / count;
         for n in 0..count as usize {
             let [begin, middle, end] = [0.0, 0.5, 1.0].map(|part| from + step * (n as f64 + part));
-            here.clear();
-            here.extend(ways.iter().filter(is_in).map(|way| way.here(middle)));
-            if !each(begin, end, &here) {
+            positions.clear();
+            positions.extend(rays.iter().filter(is_in).map(|ray| ray.position(middle)));
+            if !each(begin, end, &positions) {
                 return;
             }
         }
         at = to;
-        ways.retain_mut(|way| {
-            while way.stretch.to <= at {
-                match way.walk.next() {
-                    Some(stretch) => way.stretch = stretch,
+        rays.retain_mut(|ray| {
+            while ray.segment.to <= at {
+                match ray.traversal.next() {
+                    Some(segment) => ray.segment = segment,
                     None => return false,
                 }
             }
@@ -200,10 +205,10 @@ pub(super) fn along(
 }
 
 /// Where a ray from a point (m) in a direction (a unit vector) first enters a block that is not empty.
-pub(super) fn entry(fogs: &[Fog], ray: (DVec3, DVec3)) -> Option<Here> {
-    let ways = entered(fogs, ray, f64::INFINITY);
-    let first = ways.reduce(|a, b| if b.stretch.from < a.stretch.from { b } else { a })?;
-    Some(first.here(first.stretch.from))
+pub(super) fn first_entry(fogs: &[Fog], ray: (DVec3, DVec3)) -> Option<FogPosition> {
+    let rays = rays_in_fogs(fogs, ray, f64::INFINITY);
+    let first = rays.reduce(|a, b| if b.segment.from < a.segment.from { b } else { a })?;
+    Some(first.position(first.segment.from))
 }
 
 #[cfg(test)]
@@ -245,7 +250,7 @@ mod tests {
             (0..80).map(|_| [0; 3].map(|_: i32| 8 * (number() - 50))).collect();
         positions.sort_unstable();
         positions.dedup();
-        let parts = positions.iter().map(|at| (*at, Part::Even(1.0))).collect();
+        let parts = positions.iter().map(|at| (*at, Part::Uniform(1.0))).collect();
         let axes = [DVec3::x(), DVec3::y(), DVec3::z()];
         let placement = Placement::new(DVec3::zeros(), axes).unwrap();
         let fogs = [Fog::of_parts(&ctx, placement, parts, 1.0).unwrap()];
@@ -258,10 +263,10 @@ mod tests {
             let toward = (DVec3::from(target) - origin).normalize();
             let mut passed = vec![0.0; fogs[0].blocks().len()];
             let mut at = 0.0;
-            along(&fogs, (origin, toward), f64::INFINITY, 2.0, |from, to, here| {
+            march(&fogs, (origin, toward), f64::INFINITY, 2.0, |from, to, positions| {
                 assert!(from >= at - 1e-9 && to - from <= 2.0 + 1e-9, "{n}: {at} {from} {to}");
                 at = to;
-                here.iter().for_each(|here| passed[here.block] += to - from);
+                positions.iter().for_each(|position| passed[position.block] += to - from);
                 true
             });
             for (block, passed) in fogs[0].blocks().iter().zip(passed) {
