@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use serde_json::json;
 
-use super::each::Each;
+use super::frame_results::FrameResults;
 use super::options::{
-    Axis, MeshSpace, needs_frames, of_frame, one_frame, positive, refuse_one_file, warn_if_far,
+    Axis, MeshSpace, frame_path, needs_frames, one_frame, positive, refuse_one_file, warn_if_far,
 };
-use super::session::{Failure, Phase, Session};
+use super::session::{Failure, OrFailure, Session};
 use super::{output, points};
 use frazil::geometry::mesh::attributes::On;
 use frazil::geometry::{MeshArray, TriMesh, Uvs, Vec3};
@@ -65,7 +65,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    if points::is_one(&args.input, &args.output, args.frames.as_ref()).before()? {
+    if points::converts_points(&args.input, &args.output, args.frames.as_ref()).or_refuse()? {
         return args.points()?.run(session);
     }
     if args.voxel.is_some() {
@@ -74,30 +74,30 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     check_output(&args.output)?;
     let (mut source, frames) = args.source()?;
     refuse_one_file(&args.output, &frames, "hero.%04d.ply")?;
-    output::check_writable(&args.output).before()?;
+    output::check_writable(&args.output).or_refuse()?;
     for frame in frames.iter() {
         // The frame after the last is read for velocities.
-        let inputs = [frame, frame.saturating_add(1)].map(|frame| of_frame(&args.input, frame));
-        let path = of_frame(&args.output, frame);
-        output::refuse_input(&path, inputs.iter().map(PathBuf::as_path)).before()?;
+        let inputs = [frame, frame.saturating_add(1)].map(|frame| frame_path(&args.input, frame));
+        let path = frame_path(&args.output, frame);
+        output::refuse_input(&path, inputs.iter().map(PathBuf::as_path)).or_refuse()?;
     }
     let (mut triangles, mut has_warned) = (0, false);
-    let write = |frame| source.write(args, &of_frame(&args.output, frame), frame, &mut has_warned);
-    let each = Each::run(session, &frames, write, |count| triangles = count)?;
+    let write = |frame| source.write(args, &frame_path(&args.output, frame), frame, &mut has_warned);
+    let results = FrameResults::run(session, &frames, write, |count| triangles = count)?;
     session.record("triangles", json!(triangles));
-    each.finish()
+    results.finish()
 }
 
 /// Arrays of the vertices that hold their velocities (m/s).
 pub const VELOCITY: [&str; 3] = ["vx", "vy", "vz"];
 
-/// Renames velocities that other programs named otherwise to our names ([`VELOCITY`]).
+/// Renames velocities of other programs to our names ([`VELOCITY`]).
 pub fn name_velocities(arrays: &mut [MeshArray]) {
     for stem in VELOCITIES {
         let named = |axis: &str| {
             let name = format!("{stem}{axis}");
-            let is_it = |array: &MeshArray| array.on == On::Vertices && array.name.to_lowercase() == name;
-            arrays.iter().position(is_it)
+            let is_named = |array: &MeshArray| array.on == On::Vertices && array.name.to_lowercase() == name;
+            arrays.iter().position(is_named)
         };
         if let (Some(x), Some(y), Some(z)) = (named("x"), named("y"), named("z")) {
             for (at, name) in [x, y, z].into_iter().zip(VELOCITY) {
@@ -116,19 +116,19 @@ pub fn vectors(arrays: &[MeshArray], names: [&str; 3]) -> Option<Vec<Vec3>> {
     Some(parts.map(|((x, y), z)| Vec3::new(*x as f32, *y as f32, *z as f32)).collect())
 }
 
-/// The names, without their x, y and z, of arrays in three components, except velocities.
-fn stems(arrays: &[MeshArray]) -> Vec<&str> {
+/// The names, without x, y and z, of vectors that are stored as three arrays, except velocities.
+fn vector_stems(arrays: &[MeshArray]) -> Vec<&str> {
     let has = |name: String| arrays.iter().any(|array| array.name == name);
     let stem = |array: &'_ MeshArray| array.name.len().checked_sub(1).filter(|_| array.name.ends_with('x'));
     let named = arrays.iter().filter_map(|array| Some(&array.name[..stem(array)?]));
-    let whole = |stem: &&str| {
+    let has_all_parts = |stem: &&str| {
         !stem.is_empty() && *stem != "v" && ["y", "z"].iter().all(|part| has(format!("{stem}{part}")))
     };
-    named.filter(whole).collect()
+    named.filter(has_all_parts).collect()
 }
 
-/// "UVs, normals and materials".
-fn listed(names: &[&str]) -> String {
+/// Joins names: "UVs, normals and materials".
+fn joined_names(names: &[&str]) -> String {
     match names {
         [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
         _ => names.concat(),
@@ -161,8 +161,8 @@ pub struct MeshFile<'a> {
 }
 
 impl MeshFile<'_> {
-    /// Writes a mesh. USD stores velocities (m/s) as an attribute, not as an array: `velocities` returns them; it gets those found among
-    /// the arrays.
+    /// Writes a mesh. USD stores velocities (m/s) as an attribute, not as arrays: `velocities` gets those found among the arrays, and returns
+    /// those to write.
     pub fn write(
         &self,
         mesh: &TriMesh,
@@ -187,20 +187,20 @@ impl MeshFile<'_> {
     }
 }
 
-/// What determines the losses between two mesh files.
+/// The output of a conversion, as far as it determines what data are lost.
 pub struct Losses<'a> {
     /// File or pattern.
     pub output: &'a Path,
     /// Whether positions are unchanged.
     pub keeps_space: bool,
-    /// Whether the input is a sequence whose meshes all get the triangles of the first.
+    /// Whether the input is a sequence, whose meshes all get the triangles of the first.
     pub is_sequence: bool,
 }
 
 impl Losses<'_> {
-    /// Warns about what an input file, from which these texture coordinates were read, contains and the output cannot hold.
-    pub fn warn(&self, one: &Path, uvs: Option<&Uvs>) -> frazil::Result<()> {
-        let mut lost = if is_gltf(one) { Character::extras(one)? } else { io::mesh::extras::of(one)? };
+    /// Warns about data of an input file that the output cannot hold; `uvs` are its texture coordinates.
+    pub fn warn(&self, input: &Path, uvs: Option<&Uvs>) -> frazil::Result<()> {
+        let mut lost = if is_gltf(input) { Character::extras(input)? } else { io::mesh::extras::of(input)? };
         let uvs = uvs.filter(|_| io::mesh::holds_uvs(self.output));
         let to = extension(self.output);
         lost.retain(|name| match *name {
@@ -210,31 +210,35 @@ impl Losses<'_> {
             _ => true,
         });
         if let Some(missing) = uvs.map(|uvs| uvs.missing).filter(|missing| *missing > 0) {
-            log::warn!("{}", missing_uvs(&one.display().to_string(), missing));
+            log::warn!("{}", missing_uvs(&input.display().to_string(), missing));
         }
         if !lost.is_empty() {
-            log::warn!("{}: {} are not carried over", one.display(), listed(&lost));
+            log::warn!("{}: {} are not carried over", input.display(), joined_names(&lost));
         }
-        // These have their own warnings above.
-        const TOLD: [&str; 7] = ["vx", "vy", "vz", "red", "green", "blue", "alpha"];
-        if extension(one) != "ply" {
+        // There are warnings about these above.
+        const HAVE_OWN_WARNING: [&str; 7] = ["vx", "vy", "vz", "red", "green", "blue", "alpha"];
+        if extension(input) != "ply" {
             return Ok(());
         }
-        let arrays = io::mesh::read_any(one)?.into_detailed().arrays;
+        let arrays = io::mesh::read_any(input)?.into_detailed().arrays;
         let is_lost = |array: &&MeshArray| match to.as_str() {
             "ply" | "usda" => self.is_sequence && array.on == On::Corners,
-            _ => !TOLD.contains(&&*array.name),
+            _ => !HAVE_OWN_WARNING.contains(&&*array.name),
         };
         let names: Vec<&str> = arrays.iter().filter(is_lost).map(|array| &array.name[..]).collect();
         if !names.is_empty() {
-            log::warn!("{}: arrays are not carried over: {}", one.display(), names.join(", "));
+            log::warn!("{}: arrays are not carried over: {}", input.display(), names.join(", "));
         }
         if to == "usda" && self.is_sequence && vectors(&arrays, VELOCITY).is_some() {
-            log::warn!("{}: its velocities give way to those from frame to frame", one.display());
+            log::warn!("{}: its velocities give way to those from frame to frame", input.display());
         }
-        let vectors = stems(&arrays);
+        let vectors = vector_stems(&arrays);
         if !vectors.is_empty() && !self.keeps_space && ["ply", "usda"].contains(&to.as_str()) {
-            log::warn!("{}: these vectors keep their axes and units: {}", one.display(), vectors.join(", "));
+            log::warn!(
+                "{}: these vectors keep their axes and units: {}",
+                input.display(),
+                vectors.join(", ")
+            );
         }
         Ok(())
     }
@@ -291,7 +295,7 @@ impl Sequence {
             let last = (frame..=self.last).take_while(is_there).last().unwrap_or(frame);
             let (pattern, origin) = (self.pattern.clone(), args.space.origin.at);
             let run = MeshSequence::open_seen(pattern, frame, last, args.fps, 0.0, Arc::default(), origin);
-            self.run = run.ok().map(|run| args.placed(Box::new(run)));
+            self.run = run.ok().map(|run| args.in_metres(Box::new(run)));
         }
         if let Some(motion) = self.run.as_deref() {
             args.warn_once(&own, motion, frame, has_warned)?;
@@ -302,7 +306,7 @@ impl Sequence {
                 Err(_) => self.run = None,
             }
         }
-        let motion = args.still(&own)?;
+        let motion = args.static_mesh(&own)?;
         args.warn_once(&own, &*motion, frame, has_warned)?;
         args.write(path, &*motion, frame, false)?;
         log::info!(
@@ -332,7 +336,7 @@ impl Args {
         })
     }
 
-    /// Warns, for the first file that is converted, about what it contains and the output cannot hold.
+    /// Warns about data of the first file that the output cannot hold.
     fn warn_once(
         &self,
         one: &Path,
@@ -364,12 +368,12 @@ impl Args {
                 let (node, clip) = (self.node.clone(), self.clip.clone());
                 let start = f64::from(frames.first()) / self.fps;
                 let play = Play { node, clip, repeat: true, start };
-                let character = Box::new(Character::open(&self.input, play).before()?);
+                let character = Box::new(Character::open(&self.input, play).or_refuse()?);
                 let motion = Placed::new(character, self.space.space(), Keys::default());
                 Ok((Source::One(Box::new(motion)), frames))
             }
             None if self.frames.is_some() => Err(Failure::refused("--frames is of no use with one mesh")),
-            None => Ok((Source::One(self.still(&self.input).before()?), one_frame())),
+            None => Ok((Source::One(self.static_mesh(&self.input).or_refuse()?), one_frame())),
             Some(pattern) => {
                 let frames = self.frames.clone().ok_or_else(|| needs_frames(&self.input))?;
                 let last = frames.last();
@@ -379,13 +383,13 @@ impl Args {
     }
 
     /// A mesh, or meshes, read relative to the origin, in metres with Y up.
-    fn placed(&self, motion: Box<dyn Motion>) -> Box<dyn Motion> {
+    fn in_metres(&self, motion: Box<dyn Motion>) -> Box<dyn Motion> {
         Box::new(Placed::new(motion, self.space.space().without_origin(), Keys::default()))
     }
 
     /// A static mesh.
-    fn still(&self, path: &Path) -> frazil::Result<Box<dyn Motion>> {
-        Ok(self.placed(Box::new(Rigid::of_polygons(
+    fn static_mesh(&self, path: &Path) -> frazil::Result<Box<dyn Motion>> {
+        Ok(self.in_metres(Box::new(Rigid::of_polygons(
             io::mesh::read_any_from(path, self.space.origin.at)?,
             Keys::default(),
         ))))
@@ -393,7 +397,7 @@ impl Args {
 
     /// The arrays of a frame's mesh, if the output holds any: characters have none.
     fn arrays(&self, output: &Path, frame: i32, is_sequence: bool) -> frazil::Result<Vec<MeshArray>> {
-        let input = of_frame(&self.input, frame);
+        let input = frame_path(&self.input, frame);
         if is_gltf(&input) || extension(output) == "stl" {
             return Ok(Vec::new());
         }
@@ -418,15 +422,15 @@ impl Args {
         let time = f64::from(frame) / self.fps;
         let (mut pose, mut velocities) = (Vec::new(), Vec::new());
         motion.drawn_pose(time, &mut pose)?;
-        let out = |places: &mut Vec<frazil::geometry::DVec3>| {
-            places.iter_mut().for_each(|p| {
+        let to_output_space = |vectors: &mut Vec<frazil::geometry::DVec3>| {
+            vectors.iter_mut().for_each(|p| {
                 *p *= self.to_scale;
                 if self.to_up == Axis::Z {
                     *p = frazil::geometry::DVec3::new(p.x, -p.z, p.y);
                 }
             });
         };
-        out(&mut pose);
+        to_output_space(&mut pose);
         let (positions, drawn) = (usd::to_floats(&pose), motion.drawn());
         let mesh = TriMesh { positions, triangles: drawn.triangles.to_vec() };
         let arrays = self.arrays(path, frame, is_sequence)?;
@@ -435,7 +439,7 @@ impl Args {
         let file = MeshFile { path, name: &name, frame, fps: self.fps, units };
         file.write(&mesh, drawn.uvs, &arrays, |own| {
             motion.velocities_ahead(time, 1.0 / self.fps, &mut velocities)?;
-            out(&mut velocities);
+            to_output_space(&mut velocities);
             // In a sequence, velocities lead from each mesh to the next.
             Ok(own.filter(|_| !is_sequence).unwrap_or_else(|| usd::to_floats(&velocities)))
         })

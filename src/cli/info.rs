@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 
 use super::options::{Origin, warn_if_far};
 use super::output;
-use super::session::{Failure, Phase, Session};
+use super::session::{Failure, OrFailure, Session};
 
 /// Report what .vdb, mesh (.obj, .ply, .stl), character (.glb, .gltf) and particle files (.bgeo, .vtk, .vtu, .xyz, .ply) hold.
 #[derive(clap::Args)]
@@ -41,13 +41,13 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
             "ply" if io::particles::ply::holds_points(path).is_ok_and(|yes| yes) => {
                 super::points::info(path, args.origin.at)
             }
-            _ if super::points::is_named(path) => super::points::info(path, args.origin.at),
+            _ if super::points::is_point_file(path) => super::points::info(path, args.origin.at),
             _ => mesh(path, &args.origin),
         };
-        all.push(json!({ "file": path.display().to_string(), "holds": holds.before()? }));
+        all.push(json!({ "file": path.display().to_string(), "holds": holds.or_refuse()? }));
     }
     let text = if args.json { format!("{:#}\n", json!(all)) } else { all.iter().map(lines).collect() };
-    output::print(&text).during()
+    output::print(&text).or_fail()
 }
 
 fn mesh(path: &Path, origin: &Origin) -> frazil::Result<Vec<Value>> {

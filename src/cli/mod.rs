@@ -2,7 +2,7 @@
 
 mod check;
 mod convert;
-mod each;
+mod frame_results;
 mod info;
 mod mesh;
 mod new;

@@ -3,7 +3,7 @@
 use frazil::scene::{self, reference, template};
 
 use super::output;
-use super::session::{Failure, Phase};
+use super::session::{Failure, OrFailure};
 
 /// Print a commented scene to start from.
 #[derive(clap::Args)]
@@ -34,5 +34,5 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         System::Surface => scene::System::Surface,
         System::Shallow => scene::System::Shallow,
     };
-    output::print(&if args.keys { reference(system) } else { template(system) }).during()
+    output::print(&if args.keys { reference(system) } else { template(system) }).or_fail()
 }

@@ -43,7 +43,7 @@ pub enum Axis {
 }
 
 impl MeshSpace {
-    /// The library's type for it.
+    /// As the library's [`Space`].
     pub fn space(&self) -> Space {
         let up = match self.up {
             Axis::Y => Up::Y,
@@ -55,12 +55,12 @@ impl MeshSpace {
     /// Reads a mesh and converts it to metres, Y up.
     pub fn read(&self, path: &Path) -> Result<TriMesh> {
         let mut mesh = self.origin.read(path)?.into_triangles();
-        self.bring(&mut mesh);
+        self.convert(&mut mesh);
         Ok(mesh)
     }
 
     /// Converts a mesh that was read relative to the origin to metres, Y up.
-    pub fn bring(&self, mesh: &mut TriMesh) {
+    pub fn convert(&self, mesh: &mut TriMesh) {
         let space = self.space();
         if space.scale != 1.0 {
             join_corners(mesh);
@@ -86,7 +86,7 @@ pub fn warn_if_far(path: &Path, mesh: &TriMesh) {
     }
 }
 
-/// Moves vertices at the same corner to one position: after scaling, their rounding error is no longer known.
+/// Moves the vertices of a corner to one position. This must precede scaling, which adds rounding errors.
 pub fn join_corners(mesh: &mut TriMesh) {
     let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
     Weld::of(&positions, &mesh.triangles).unify(&mut mesh.positions);
@@ -101,12 +101,12 @@ pub fn warn_of_corners(path: &Path, mesh: &TriMesh) {
     }
 }
 
-/// The file of a frame, from one file or a pattern of files.
-pub fn of_frame(path: &Path, frame: i32) -> PathBuf {
+/// The file of a frame: a single file is that of all frames.
+pub fn frame_path(path: &Path, frame: i32) -> PathBuf {
     Pattern::parse(path).map_or_else(|| path.to_path_buf(), |pattern| pattern.path(frame))
 }
 
-/// Frame 1: what is made if no frames are chosen.
+/// Frame 1, the default if no frames are chosen.
 pub fn one_frame() -> FrameChoice {
     FrameChoice::from(Frames { first: 1, last: 1 })
 }

@@ -15,13 +15,13 @@ use frazil::scene::FrameChoice;
 use frazil::{Error, Result};
 use serde_json::{Map, Value, json};
 
-use super::each::Each;
-use super::options::{needs_frames, of_frame, one_frame, refuse_one_file};
+use super::frame_results::FrameResults;
+use super::options::{frame_path, needs_frames, one_frame, refuse_one_file};
 use super::output;
-use super::session::{Failure, Phase, Session};
+use super::session::{Failure, OrFailure, Session};
 
 /// The description of points in `frazil info`, without the name of their grid.
-pub fn described(points: &Points) -> Map<String, Value> {
+pub fn description(points: &Points) -> Map<String, Value> {
     let mut out = Map::new();
     out.insert("points".into(), json!(points.count()));
     out.insert("voxel_m".into(), json!(points.voxel_size));
@@ -46,46 +46,46 @@ pub fn described(points: &Points) -> Map<String, Value> {
 
 /// Describes the points of a file other than .vdb for `frazil info`.
 pub fn info(path: &Path, origin: DVec3) -> Result<Vec<Value>> {
-    let mut cloud = particles::read(path)?;
-    Space { origin, ..Space::OWN }.bring(&mut cloud);
-    // Voxels are irrelevant if the file gives no size.
-    let size = cloud.voxel_size.unwrap_or(1.0);
-    let known = cloud.voxel_size.is_some();
-    let points = cloud.into_points(Some(size)).map_err(|error| Error::file(path, error.to_string()))?;
+    let mut data = particles::read(path)?;
+    Space { origin, ..Space::OWN }.bring(&mut data);
+    // Any size of voxels will do if the file gives none.
+    let size = data.voxel_size.unwrap_or(1.0);
+    let has_size = data.voxel_size.is_some();
+    let points = data.into_points(Some(size)).map_err(|error| Error::file(path, error.to_string()))?;
     let mut entry = Map::from_iter([("type".to_string(), json!("points"))]);
-    entry.extend(described(&points));
-    if !known {
+    entry.extend(description(&points));
+    if !has_size {
         entry.remove("voxel_m");
     }
     Ok(vec![Value::Object(entry)])
 }
 
-/// Whether a file's extension is one of points; .ply does not count, as it may hold a mesh.
-pub fn is_named(path: &Path) -> bool {
+/// Whether a file's extension is one of point files; .ply does not count, as it may hold a mesh.
+pub fn is_point_file(path: &Path) -> bool {
     let extension = extension(path);
     extension == "vdb" || extension != "ply" && particles::is_named(path)
 }
 
 /// Whether `frazil convert` converts points: a file of points in or out, or a .ply without faces.
-pub fn is_one(input: &Path, output: &Path, frames: Option<&FrameChoice>) -> Result<bool> {
-    if [input, output].into_iter().any(is_named) {
+pub fn converts_points(input: &Path, output: &Path, frames: Option<&FrameChoice>) -> Result<bool> {
+    if [input, output].into_iter().any(is_point_file) {
         return Ok(true);
     }
     if extension(input) != "ply" || !["ply", "usda"].contains(&extension(output).as_str()) {
         return Ok(false);
     }
-    let one = match (Pattern::parse(input), frames) {
+    let first = match (Pattern::parse(input), frames) {
         // The first existing frame decides.
         (Some(pattern), Some(frames)) => {
             frames.iter().map(|frame| pattern.path(frame)).find(|path| path.is_file())
         }
         _ => Some(input.to_path_buf()).filter(|path| path.is_file()),
     };
-    one.map_or(Ok(false), |one| ply::holds_points(&one))
+    first.map_or(Ok(false), |first| ply::holds_points(&first))
 }
 
-/// Points of a file, and whether their voxels are the file's own rather than just a container.
-struct Read {
+/// Points of a file, and whether their voxels have a size from the file or the user, rather than an arbitrary one.
+struct LoadedPoints {
     points: Points,
     has_voxels: bool,
 }
@@ -127,50 +127,50 @@ impl Conversion<'_> {
         }
         let frames = self.frames.cloned().unwrap_or_else(one_frame);
         refuse_one_file(self.output, &frames, "grains.%04d.ply")?;
-        output::check_writable(self.output).before()?;
+        output::check_writable(self.output).or_refuse()?;
         for frame in frames.iter() {
-            let from = of_frame(self.input, frame);
-            output::refuse_input(&of_frame(self.output, frame), [from.as_path()]).before()?;
+            let from = frame_path(self.input, frame);
+            output::refuse_input(&frame_path(self.output, frame), [from.as_path()]).or_refuse()?;
         }
         let mut count = 0;
         let convert = |frame| {
-            let read = self.read(&of_frame(self.input, frame))?;
-            self.write(&of_frame(self.output, frame), frame, &read, session)?;
-            Ok(read.points.count())
+            let loaded = self.read(&frame_path(self.input, frame))?;
+            self.write(&frame_path(self.output, frame), frame, &loaded, session)?;
+            Ok(loaded.points.count())
         };
-        let each = Each::run(session, &frames, convert, |points| count += points)?;
+        let results = FrameResults::run(session, &frames, convert, |points| count += points)?;
         session.record("points", json!(count));
-        each.finish()
+        results.finish()
     }
 
-    fn read(&self, path: &Path) -> Result<Read> {
-        let mut cloud = match extension(path).as_str() {
+    fn read(&self, path: &Path) -> Result<LoadedPoints> {
+        let mut data = match extension(path).as_str() {
             "vdb" => {
                 let points = points_of_vdb(path)?;
                 if self.space == Space::OWN {
-                    // Bit for bit, which regrouping into voxels need not be.
-                    return Ok(Read { points, has_voxels: true });
+                    // These are kept bit by bit, unlike points that are regrouped into voxels.
+                    return Ok(LoadedPoints { points, has_voxels: true });
                 }
                 ParticleData::from(points)
             }
             _ => particles::read(path)?,
         };
-        self.space.bring(&mut cloud);
-        let voxel = self.voxel.or(cloud.voxel_size);
+        self.space.bring(&mut data);
+        let voxel = self.voxel.or(data.voxel_size);
         // Only .vdb files need voxels.
-        let any = (extension(self.output) != "vdb").then_some(1.0);
-        if voxel.or(any).is_none() {
+        let default = (extension(self.output) != "vdb").then_some(1.0);
+        if voxel.or(default).is_none() {
             let what = "does not say how large the voxels of its points are: give --voxel";
             return Err(Error::file(path, what));
         }
         let points =
-            cloud.into_points(voxel.or(any)).map_err(|error| Error::file(path, error.to_string()))?;
-        Ok(Read { points, has_voxels: voxel.is_some() })
+            data.into_points(voxel.or(default)).map_err(|error| Error::file(path, error.to_string()))?;
+        Ok(LoadedPoints { points, has_voxels: voxel.is_some() })
     }
 
     #[cfg_attr(not(feature = "vdb"), expect(unused_variables, reason = "grids are made by threads"))]
-    fn write(&self, path: &Path, frame: i32, read: &Read, session: &Session) -> Result<()> {
-        let Read { points, has_voxels } = read;
+    fn write(&self, path: &Path, frame: i32, loaded: &LoadedPoints, session: &Session) -> Result<()> {
+        let LoadedPoints { points, has_voxels } = loaded;
         match extension(path).as_str() {
             #[cfg(feature = "vdb")]
             "vdb" => {

@@ -14,7 +14,7 @@ use frazil::scene::{Override, Scene, System};
 use serde::Serialize;
 
 use super::output;
-use super::session::{Failure, Phase, Session};
+use super::session::{Failure, OrFailure, Session};
 
 /// Read every input of every frame of a scene, and print its sizes, memory and disk; nothing is computed.
 ///
@@ -43,8 +43,8 @@ impl Args {
     #[cfg(feature = "vdb")]
     fn free_space(&self) -> Option<u64> {
         let absolute = std::path::absolute(self.output.as_deref()?).ok()?;
-        let there = absolute.ancestors().find(|folder| folder.exists())?;
-        super::session::machine::free_space(there)
+        let existing = absolute.ancestors().find(|folder| folder.exists())?;
+        super::session::machine::free_space(existing)
     }
 
     /// Unknown.
@@ -69,7 +69,7 @@ fn frames_in_words([first, last]: [i32; 2], fps: f64) -> String {
     format!("frames    {first}-{last}: {count}, {seconds:.2} s at {fps} a second\n")
 }
 
-/// What is free, if it is known.
+/// The free space, if it is known.
 fn free_in_words(free: Option<u64>) -> String {
     free.map_or(String::new(), |free| format!(" of {} free", size(free)))
 }
@@ -78,7 +78,7 @@ fn warnings_in_words(warnings: &[String]) -> String {
     warnings.iter().map(|warning| format!("warning   {warning}\n")).collect()
 }
 
-/// Warns if the files need more than is free; `how` says how sure that is.
+/// Warns if the files need more than the free space; `how` is the verb, as "need about".
 fn warn_of_space(warnings: &mut Vec<String>, how: &str, needed: Option<u64>, free: Option<u64>) {
     if let (Some(needed), Some(free)) = (needed, free)
         && needed > free
@@ -94,7 +94,7 @@ fn print(args: &Args, report: &impl Serialize, in_words: impl FnOnce() -> String
     } else {
         in_words()
     };
-    output::print(&text).during()
+    output::print(&text).or_fail()
 }
 
 /// Runs the command.
@@ -102,14 +102,14 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.scene.is_dir() {
         return check_folder(args, session);
     }
-    let scene = Scene::read_with(&args.scene, &args.set).before()?;
+    let scene = Scene::read_with(&args.scene, &args.set).or_refuse()?;
     if scene.system() == System::Shallow {
         return shallow::run(args, session, &scene);
     }
     #[cfg(feature = "vdb")]
     return snow::run(args, session, scene);
     #[cfg(not(feature = "vdb"))]
-    super::needs_openvdb(&args.scene).before()
+    super::needs_openvdb(&args.scene).or_refuse()
 }
 
 /// Compares an output folder with what was written into it.
@@ -117,7 +117,7 @@ fn check_folder(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.output.is_some() || !args.set.is_empty() || args.preview.is_some() {
         return Err(Failure::refused("-o, --set and --preview are of no use with an output folder"));
     }
-    let verified = verify(&session.ctx, &args.scene).before()?;
+    let verified = verify(&session.ctx, &args.scene).or_refuse()?;
     print(args, &verified, || verified_in_words(&verified))?;
     session.record("frames", verified.frames.into());
     match &verified.damaged[..] {

@@ -8,7 +8,7 @@ use frazil::scene::shallow::{Inputs, Report, check};
 use super::{
     Args, frames_in_words, free_in_words, print, refuse_preview, size, warn_of_space, warnings_in_words,
 };
-use crate::cli::session::{Failure, Phase, Session};
+use crate::cli::session::{Failure, OrFailure, Session};
 
 /// Checks the scene.
 pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure> {
@@ -16,8 +16,8 @@ pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure>
     let limit = session.max_memory();
     // The check converts the terrain to columns, too.
     session.ctx.set_memory_limit(limit);
-    let inputs = Inputs::load(&session.ctx, scene).before()?;
-    let mut report = check(&session.ctx, scene, &inputs).before()?;
+    let inputs = Inputs::load(&session.ctx, scene).or_refuse()?;
+    let mut report = check(&session.ctx, scene, &inputs).or_refuse()?;
     if let Err(error) = report.check_memory(limit) {
         report.warnings.push(error.to_string());
     }

@@ -7,7 +7,7 @@ use frazil::scene::snow::check::{ObjectReport, Report, check};
 use frazil::scene::{Inputs, Scene, System, check_memory};
 
 use super::{Args, frames_in_words, free_in_words, print, size, surface, warn_of_space, warnings_in_words};
-use crate::cli::session::{Failure, Phase, Session};
+use crate::cli::session::{Failure, OrFailure, Session};
 
 /// Checks the scene.
 pub fn run(args: &Args, session: &Session, mut scene: Scene) -> Result<(), Failure> {
@@ -15,10 +15,10 @@ pub fn run(args: &Args, session: &Session, mut scene: Scene) -> Result<(), Failu
         return surface::run(args, session, &scene);
     }
     if let Some(factor) = args.preview {
-        scene.coarsen(factor.into()).before()?;
+        scene.coarsen(factor.into()).or_refuse()?;
     }
-    let inputs = Inputs::load(&scene).before()?;
-    let mut report = check(&session.ctx, &scene, &inputs, args.output.as_deref()).before()?;
+    let inputs = Inputs::load(&scene).or_refuse()?;
+    let mut report = check(&session.ctx, &scene, &inputs, args.output.as_deref()).or_refuse()?;
     let limit = session.max_memory();
     let close = report.grains.as_ref().and_then(|grains| grains.warning(&scene));
     let too_many = report.grains.as_ref().and_then(|grains| grains.check(&scene, limit).err());
@@ -100,9 +100,12 @@ fn describe_mist(out: &mut String, mist: &MistForecast, limit: u64) {
         size(mist.disk_bytes)
     );
     if limit < u64::MAX {
-        let most = mist.most_cells(limit);
-        let air = most as f64 * mist.cell_m.powi(3);
-        let _ = writeln!(out, "          --max-memory refuses a step of more than {most} cells, {air:.3} m3");
+        let max_cells = mist.max_cells(limit);
+        let air = max_cells as f64 * mist.cell_m.powi(3);
+        let _ = writeln!(
+            out,
+            "          --max-memory refuses a step of more than {max_cells} cells, {air:.3} m3"
+        );
     }
 }
 

@@ -8,19 +8,19 @@ use frazil::scene::surface::{Inputs, Report, check};
 use super::{
     Args, frames_in_words, free_in_words, print, refuse_preview, size, warn_of_space, warnings_in_words,
 };
-use crate::cli::session::{Failure, Phase, Session};
+use crate::cli::session::{Failure, OrFailure, Session};
 
 /// Checks the scene.
 pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure> {
     refuse_preview(args, "surface")?;
     // A mesh may have to be repaired.
     session.ctx.set_memory_limit(session.max_memory());
-    let inputs = Inputs::load(&session.ctx, scene).before()?;
+    let inputs = Inputs::load(&session.ctx, scene).or_refuse()?;
     session.ctx.set_memory_limit(u64::MAX);
-    let mut report = check(&session.ctx, scene, &inputs).before()?;
+    let mut report = check(&session.ctx, scene, &inputs).or_refuse()?;
     let limit = session.max_memory();
     if let Err(error) = report.check_memory(limit) {
-        // A run reads no frames ahead, so it cannot know this.
+        // This is only a warning, as a run does not know the particles of later frames either.
         let what = format!("{error}; a run begins all the same, and ends where one part needs more");
         report.warnings.push(what);
     }
@@ -31,8 +31,8 @@ pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure>
 
 fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
     let mut out = frames_in_words(report.frames, report.fps);
-    let [least, most] = report.particles;
-    let counts = if least == most { least.to_string() } else { format!("{least} to {most}") };
+    let [min, max] = report.particles;
+    let counts = if min == max { min.to_string() } else { format!("{min} to {max}") };
     let motion = match (report.has_ids, report.has_velocities) {
         (true, true) => "ids and velocities",
         (true, false) => "ids, no velocities",

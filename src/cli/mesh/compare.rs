@@ -12,9 +12,9 @@ use frazil::{Context, Error, io};
 use serde_json::{Map, Value, json};
 
 use super::compared::Model;
-use crate::cli::options::{Origin, of_frame};
+use crate::cli::options::{Origin, frame_path};
 use crate::cli::output;
-use crate::cli::session::{Failure, Phase, Session};
+use crate::cli::session::{Failure, OrFailure, Session};
 
 /// Report how far two meshes lie apart, or two sequences of them frame by frame, and how much a sequence flickers.
 ///
@@ -103,16 +103,16 @@ impl Args {
             .paths()
             .map(|path| Model::read(path, &self.origin))
             .collect::<frazil::Result<Vec<_>>>()
-            .before()?;
+            .or_refuse()?;
         let [a, b] = &models[..] else { return Err(Failure::refused("a second mesh is missing")) };
-        let found = Comparison::of(&session.ctx, a, b).during()?;
+        let found = Comparison::of(&session.ctx, a, b).or_fail()?;
         if self.json {
             let mut object = self.names();
             object.extend(found.json());
-            return output::print(&format!("{:#}\n", Value::Object(object))).during();
+            return output::print(&format!("{:#}\n", Value::Object(object))).or_fail();
         }
         let names: Vec<String> = self.paths().map(|path| path.display().to_string()).collect();
-        output::print(&found.in_words(&names[0], &names[1])).during()
+        output::print(&found.in_words(&names[0], &names[1])).or_fail()
     }
 
     /// Compares two sequences, or checks one for flicker, frame by frame.
@@ -120,40 +120,40 @@ impl Args {
         for &frame in frames {
             for path in self.paths() {
                 // Report a gap in a sequence before any work.
-                io::files::source::open(&of_frame(path, frame)).before()?;
+                io::files::source::open(&frame_path(path, frame)).or_refuse()?;
             }
         }
-        let is_watched = |path: &PathBuf| self.flicker && Pattern::parse(path).is_some();
-        let watched = |path: &PathBuf| is_watched(path).then(|| Flicker::of(path));
-        let mut flickers: Vec<Option<Flicker>> = self.paths().map(watched).collect();
+        let has_flicker = |path: &PathBuf| self.flicker && Pattern::parse(path).is_some();
+        let flicker_of = |path: &PathBuf| has_flicker(path).then(|| Flicker::of(path));
+        let mut flickers: Vec<Option<Flicker>> = self.paths().map(flicker_of).collect();
         let mut found: Vec<(i32, Comparison)> = Vec::new();
         let models = |frame: i32| {
             self.paths()
-                .map(|path| Model::read(&of_frame(path, frame), &self.origin))
+                .map(|path| Model::read(&frame_path(path, frame), &self.origin))
                 .collect::<frazil::Result<Vec<_>>>()
         };
         // Fail early if the first frame cannot be compared.
-        self.look(session, models(frames[0]).before()?, frames[0], &mut found, &mut flickers)?;
-        let looked = frames[1..].iter().try_for_each(|&frame| {
-            self.look(session, models(frame).during()?, frame, &mut found, &mut flickers)
+        self.compare_frame(session, models(frames[0]).or_refuse()?, frames[0], &mut found, &mut flickers)?;
+        let result = frames[1..].iter().try_for_each(|&frame| {
+            self.compare_frame(session, models(frame).or_fail()?, frame, &mut found, &mut flickers)
         });
         let flickers = || flickers.iter().flatten();
         if !self.json {
-            looked?;
+            result?;
             let text: String = flickers().map(Flicker::in_words).collect();
-            return output::print(&(all_in_words(&found) + &text)).during();
+            return output::print(&(all_in_words(&found) + &text)).or_fail();
         }
         // Frames before an error are reported in JSON as in text, but `all_frames` is then null.
         let mut object = self.names();
         object.insert("frames".into(), found.iter().map(|(frame, found)| found.json_of(*frame)).collect());
-        object.insert("all_frames".into(), all_json(if looked.is_ok() { &found[..] } else { &[] }));
-        object.insert("flicker".into(), flickers().map(|flicker| flicker.json(looked.is_ok())).collect());
-        output::print(&format!("{:#}\n", Value::Object(object))).during()?;
-        looked
+        object.insert("all_frames".into(), all_json(if result.is_ok() { &found[..] } else { &[] }));
+        object.insert("flicker".into(), flickers().map(|flicker| flicker.json(result.is_ok())).collect());
+        output::print(&format!("{:#}\n", Value::Object(object))).or_fail()?;
+        result
     }
 
     /// Compares the meshes of a frame, and prints the result.
-    fn look(
+    fn compare_frame(
         &self,
         session: &Session,
         models: Vec<Model>,
@@ -161,41 +161,41 @@ impl Args {
         found: &mut Vec<(i32, Comparison)>,
         flickers: &mut [Option<Flicker>],
     ) -> Result<(), Failure> {
-        session.ctx.check().during()?;
+        session.ctx.check().or_fail()?;
         if let [a, b] = &models[..] {
-            let comparison = Comparison::of(&session.ctx, a, b).during()?;
-            self.say(&format!("frame {frame}: {}\n", comparison.in_a_line()))?;
+            let comparison = Comparison::of(&session.ctx, a, b).or_fail()?;
+            self.print_now(&format!("frame {frame}: {}\n", comparison.in_a_line()))?;
             found.push((frame, comparison));
         }
         for (flicker, model) in flickers.iter_mut().zip(models) {
             let Some(flicker) = flicker else { continue };
-            if let Some(text) = flicker.add(&session.ctx, frame, model).during()? {
-                self.say(&text)?;
+            if let Some(text) = flicker.add(&session.ctx, frame, model).or_fail()? {
+                self.print_now(&text)?;
             }
         }
         Ok(())
     }
 
     /// Prints text as soon as it is known.
-    fn say(&self, text: &str) -> Result<(), Failure> {
-        if self.json { Ok(()) } else { output::print(text).during() }
+    fn print_now(&self, text: &str) -> Result<(), Failure> {
+        if self.json { Ok(()) } else { output::print(text).or_fail() }
     }
 }
 
 /// Distances between the surfaces of two meshes, both ways.
-struct Apart {
+struct SurfaceDistances {
     to: Deviation,
     back: Deviation,
 }
 
-impl Apart {
+impl SurfaceDistances {
     fn of(ctx: &Context, a: &TriMesh, b: &TriMesh) -> frazil::Result<Self> {
         ctx.phase("distances", || {
-            let known = |found: Option<Deviation>| {
+            let checked = |found: Option<Deviation>| {
                 found.ok_or_else(|| Error::argument("a mesh without triangles has no surface to compare"))
             };
-            let to = known(from_surface(a, &NearestTree::new(b)))?;
-            Ok(Self { to, back: known(from_surface(b, &NearestTree::new(a)))? })
+            let to = checked(from_surface(a, &NearestTree::new(b)))?;
+            Ok(Self { to, back: checked(from_surface(b, &NearestTree::new(a)))? })
         })
     }
 
@@ -207,7 +207,7 @@ impl Apart {
 
 /// The comparison of two meshes.
 struct Comparison {
-    apart: Apart,
+    distances: SurfaceDistances,
     /// From vertex to vertex, if both have the same faces.
     vertices: Option<Deviation>,
     /// Areas of both (m2).
@@ -220,7 +220,7 @@ impl Comparison {
     fn of(ctx: &Context, a: &Model, b: &Model) -> frazil::Result<Self> {
         let both = [&a.mesh, &b.mesh];
         Ok(Self {
-            apart: Apart::of(ctx, &a.mesh, &b.mesh)?,
+            distances: SurfaceDistances::of(ctx, &a.mesh, &b.mesh)?,
             vertices: if a.has_faces_of(b) { from_vertices(&a.mesh, &b.mesh) } else { None },
             areas: both.map(TriMesh::area),
             volumes: both.map(TriMesh::volume),
@@ -229,11 +229,11 @@ impl Comparison {
 
     fn json(&self) -> Map<String, Value> {
         let value = json!({
-            "a_to_b": distances(&self.apart.to),
-            "b_to_a": distances(&self.apart.back),
-            "hausdorff_m": self.apart.hausdorff(),
+            "a_to_b": deviation_json(&self.distances.to),
+            "b_to_a": deviation_json(&self.distances.back),
+            "hausdorff_m": self.distances.hausdorff(),
             "same_faces": self.vertices.is_some(),
-            "vertex_to_vertex": self.vertices.as_ref().map(distances),
+            "vertex_to_vertex": self.vertices.as_ref().map(deviation_json),
             "areas_m2": self.areas,
             "area_difference_percent": percent(self.areas),
             "volumes_m3": self.volumes,
@@ -259,9 +259,9 @@ impl Comparison {
             "{a}: area {area:.6} m2, volume {volume:.6} m3\n\
              {b}: area {other_area:.6} m2 ({areas}), volume {other_volume:.6} m3 ({volumes})\n  \
              from {a} to {b}: {}\n  from {b} to {a}: {}\n  Hausdorff distance {:.6} m\n  {vertices}\n",
-            in_words(&self.apart.to),
-            in_words(&self.apart.back),
-            self.apart.hausdorff()
+            in_words(&self.distances.to),
+            in_words(&self.distances.back),
+            self.distances.hausdorff()
         )
     }
 
@@ -271,7 +271,7 @@ impl Comparison {
             format!("the same faces, from vertex to vertex {}", in_words(found))
         });
         let (areas, volumes) = (difference(self.areas), difference(self.volumes));
-        let [to, back] = [&self.apart.to, &self.apart.back].map(in_words);
+        let [to, back] = [&self.distances.to, &self.distances.back].map(in_words);
         format!("from A to B {to}; from B to A {back}; area {areas}, volume {volumes}; {vertices}")
     }
 }
@@ -293,10 +293,10 @@ impl Overall {
         for (frame, found) in frames {
             count += 1;
             sum += found.mean;
-            let most = all.get_or_insert(Self { mean: 0.0, p95: 0.0, max: found.max, frame });
-            most.p95 = most.p95.max(found.p95);
-            if found.max > most.max {
-                (most.max, most.frame) = (found.max, frame);
+            let overall = all.get_or_insert(Self { mean: 0.0, p95: 0.0, max: found.max, frame });
+            overall.p95 = overall.p95.max(found.p95);
+            if found.max > overall.max {
+                (overall.max, overall.frame) = (found.max, frame);
             }
         }
         all.map(|all| Self { mean: sum / f64::from(count), ..all })
@@ -316,8 +316,8 @@ impl Overall {
 
 /// From A to B, back, and from vertex to vertex if all frames have the same faces.
 fn overall(found: &[(i32, Comparison)]) -> [(&'static str, &'static str, Option<Overall>); 3] {
-    let to = Overall::of(found.iter().map(|(frame, found)| (*frame, &found.apart.to)));
-    let back = Overall::of(found.iter().map(|(frame, found)| (*frame, &found.apart.back)));
+    let to = Overall::of(found.iter().map(|(frame, found)| (*frame, &found.distances.to)));
+    let back = Overall::of(found.iter().map(|(frame, found)| (*frame, &found.distances.back)));
     let vertices: Option<Vec<(i32, &Deviation)>> =
         found.iter().map(|(frame, found)| Some((*frame, found.vertices.as_ref()?))).collect();
     let vertices = vertices.and_then(|vertices| Overall::of(vertices.into_iter()));
@@ -353,7 +353,7 @@ fn all_in_words(found: &[(i32, Comparison)]) -> String {
 
 /// The maximum over all frames (m).
 fn hausdorff(found: &[(i32, Comparison)]) -> f64 {
-    found.iter().map(|(_, found)| found.apart.hausdorff()).fold(0.0, f64::max)
+    found.iter().map(|(_, found)| found.distances.hausdorff()).fold(0.0, f64::max)
 }
 
 /// The flicker of a sequence.
@@ -369,7 +369,7 @@ enum Step {
     /// Second differences around the middle frame of three with the same faces.
     Vertices(i32, Deviation),
     /// Two frames with different faces.
-    Surfaces([i32; 2], Apart),
+    Surfaces([i32; 2], SurfaceDistances),
 }
 
 impl Flicker {
@@ -381,7 +381,7 @@ impl Flicker {
     fn add(&mut self, ctx: &Context, frame: i32, model: Model) -> frazil::Result<Option<String>> {
         let step = match &self.last[..] {
             [.., (before, last)] if !model.has_faces_of(last) => {
-                Some(Step::Surfaces([*before, frame], Apart::of(ctx, &last.mesh, &model.mesh)?))
+                Some(Step::Surfaces([*before, frame], SurfaceDistances::of(ctx, &last.mesh, &model.mesh)?))
             }
             [(_, first), (middle, last)] if last.has_faces_of(first) => {
                 let found = second_differences([&first.mesh, &last.mesh, &model.mesh]);
@@ -408,17 +408,17 @@ impl Flicker {
 
     fn json(&self, is_whole: bool) -> Value {
         let frames = self.vertices().map(|(frame, found)| {
-            let mut value = distances(found);
+            let mut value = deviation_json(found);
             value["frame"] = json!(frame);
             value
         });
         let changes = self.steps.iter().filter_map(|step| match step {
             Step::Vertices(..) => None,
-            Step::Surfaces(frames, apart) => Some(json!({
+            Step::Surfaces(frames, distances) => Some(json!({
                 "frames": frames,
-                "forward": distances(&apart.to),
-                "back": distances(&apart.back),
-                "hausdorff_m": apart.hausdorff(),
+                "forward": deviation_json(&distances.to),
+                "back": deviation_json(&distances.back),
+                "hausdorff_m": distances.hausdorff(),
             })),
         });
         json!({
@@ -446,16 +446,16 @@ impl Step {
     fn in_words(&self) -> String {
         match self {
             Self::Vertices(frame, found) => format!("flicker around frame {frame}: {}", in_words(found)),
-            Self::Surfaces([from, to], apart) => format!(
+            Self::Surfaces([from, to], distances) => format!(
                 "frames {from} and {to} have other faces: there {}; back {}",
-                in_words(&apart.to),
-                in_words(&apart.back)
+                in_words(&distances.to),
+                in_words(&distances.back)
             ),
         }
     }
 }
 
-fn distances(found: &Deviation) -> Value {
+fn deviation_json(found: &Deviation) -> Value {
     let at = <[f64; 3]>::from(found.max_at);
     json!({ "mean_m": found.mean, "p95_m": found.p95, "max_m": found.max, "max_at_m": at })
 }
@@ -468,7 +468,7 @@ fn in_words(found: &Deviation) -> String {
     )
 }
 
-/// How much larger the second number is, in percent; none if the first is 0.
+/// The relative difference of the second number from the first, in percent; none if the first is 0.
 fn percent([a, b]: [f64; 2]) -> Option<f64> {
     (a != 0.0).then(|| 100.0 * (b - a) / a.abs())
 }

@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 
 use super::options::{MeshSpace, warn_if_far};
 use super::output;
-use super::session::{Failure, Phase, Session};
+use super::session::{Failure, OrFailure, Session};
 
 /// Check, compare and repair meshes.
 #[derive(clap::Args)]
@@ -64,17 +64,17 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 fn check(args: &CheckArgs, session: &Session) -> Result<(), Failure> {
     let mut all = Vec::new();
     for path in &args.files {
-        let mesh = args.read(path).before()?;
+        let mesh = args.read(path).or_refuse()?;
         warn_if_far(path, &mesh);
-        let faults = session.ctx.phase("faults", || Ok(Faults::of(&mesh))).during()?;
-        let bodies = session.ctx.phase("bodies", || Ok(Body::all(&mesh, &faults))).during()?;
+        let faults = session.ctx.phase("faults", || Ok(Faults::of(&mesh))).or_fail()?;
+        let bodies = session.ctx.phase("bodies", || Ok(Body::all(&mesh, &faults))).or_fail()?;
         if args.json {
             all.push(report(path, &mesh, &faults, &bodies));
         } else {
-            output::print(&in_words(path, &mesh, &faults, &bodies)).during()?;
+            output::print(&in_words(path, &mesh, &faults, &bodies)).or_fail()?;
         }
     }
-    if args.json { output::print(&format!("{:#}\n", json!(all))).during() } else { Ok(()) }
+    if args.json { output::print(&format!("{:#}\n", json!(all))).or_fail() } else { Ok(()) }
 }
 
 impl CheckArgs {
@@ -83,7 +83,7 @@ impl CheckArgs {
             return self.space.read(path);
         }
         let mut mesh = Character::at_rest_from(path, self.space.origin.at)?;
-        self.space.bring(&mut mesh);
+        self.space.convert(&mut mesh);
         Ok(mesh)
     }
 }
@@ -147,9 +147,9 @@ impl Body {
     /// The bodies of a mesh with these faults, in the order of their first triangles.
     fn all(mesh: &TriMesh, faults: &Faults) -> Vec<Self> {
         let bodies = bodies(mesh);
-        let is_alone = bodies.len() == 1;
+        let is_single = bodies.len() == 1;
         let body = |mesh: TriMesh| {
-            let faults = if is_alone { faults.clone() } else { Faults::of(&mesh) };
+            let faults = if is_single { faults.clone() } else { Faults::of(&mesh) };
             Self { mesh, faults }
         };
         bodies.into_iter().map(body).collect()
@@ -171,25 +171,25 @@ impl Body {
     }
 }
 
-/// See [`Body`].
+/// The meshes of the bodies of a mesh.
 fn bodies(mesh: &TriMesh) -> Vec<TriMesh> {
-    let places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
-    let same = Weld::of(&places, &mesh.triangles).firsts;
+    let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
+    let same = Weld::of(&positions, &mesh.triangles).firsts;
     let joined = mesh.triangles.iter().map(|corners| corners.map(|vertex| same[vertex as usize]));
-    let place = |vertex: u32| mesh.positions[vertex as usize];
-    let triangles: Vec<[u32; 3]> = joined.filter(|corners| !is_flat(&corners.map(place))).collect();
-    let alone = |body: Vec<u32>| {
+    let position = |vertex: u32| mesh.positions[vertex as usize];
+    let triangles: Vec<[u32; 3]> = joined.filter(|corners| !is_flat(&corners.map(position))).collect();
+    let component = |body: Vec<u32>| {
         let corners: Vec<[u32; 3]> = body.iter().map(|triangle| triangles[*triangle as usize]).collect();
         let mut vertices = corners.as_flattened().to_vec();
         vertices.sort_unstable();
         vertices.dedup();
         let number = |vertex: u32| vertices.partition_point(|other| *other < vertex) as u32;
         TriMesh {
-            positions: vertices.iter().map(|&vertex| place(vertex)).collect(),
+            positions: vertices.iter().map(|&vertex| position(vertex)).collect(),
             triangles: corners.iter().map(|corners| corners.map(number)).collect(),
         }
     };
-    topology::bodies(&triangles).into_iter().map(alone).collect()
+    topology::bodies(&triangles).into_iter().map(component).collect()
 }
 
 /// The nouns of faults, singular and plural.
@@ -204,7 +204,7 @@ const PARTS: Nouns<2> = [
 ];
 
 /// Faulty edges and vertices, joined by position or by index.
-const JOINTS: Nouns<4> = [
+const JOINED: Nouns<4> = [
     ["edge with one triangle", "edges with one triangle"],
     [
         "non-manifold edge: it has more than two triangles",
@@ -268,7 +268,7 @@ fn in_words(path: &Path, mesh: &TriMesh, faults: &Faults, bodies: &[Body]) -> St
         (mesh.triangles.len(), ["triangle", "triangles"]),
         (faults.parts, ["part", "parts"]),
     ]
-    .map(|(count, forms)| format!("{count} {}", form(count, forms)));
+    .map(|(count, nouns)| format!("{count} {}", noun(count, nouns)));
     let mut out = format!("{}: {what}\n  {vertices}, {triangles}, {parts}", path.display());
     if let Some(genus) = faults.genus {
         out += &format!(", genus {genus}");
@@ -282,7 +282,8 @@ fn in_words(path: &Path, mesh: &TriMesh, faults: &Faults, bodies: &[Body]) -> St
     let (area, volume) = (faults.area, if is_rounding { 0.0 } else { faults.volume });
     out += &format!("area {area:.6} m2, volume {volume:.6} m3\n");
     out += &bodies_in_words(bodies);
-    let joints = [faults.open_edges, faults.crowded_edges, faults.turned_edges, faults.non_manifold_vertices];
+    let joined_counts =
+        [faults.open_edges, faults.crowded_edges, faults.turned_edges, faults.non_manifold_vertices];
     let triangles = [
         faults.crossings,
         faults.corner_crossings,
@@ -297,14 +298,14 @@ fn in_words(path: &Path, mesh: &TriMesh, faults: &Faults, bodies: &[Body]) -> St
         faults.unused_vertices,
     ];
     let parts = [faults.holes, faults.inverted_parts].into_iter().zip(PARTS);
-    let all = parts.chain(joints.into_iter().zip(JOINTS)).chain(triangles.into_iter().zip(TRIANGLES));
-    out.extend(all.filter(|(count, _)| *count > 0).map(|(count, forms)| line(count, forms)));
+    let all = parts.chain(joined_counts.into_iter().zip(JOINED)).chain(triangles.into_iter().zip(TRIANGLES));
+    out.extend(all.filter(|(count, _)| *count > 0).map(|(count, nouns)| count_line(count, nouns)));
     // Faults hidden by joining vertices by position.
     let as_it_is =
         [by_index.open_edges, by_index.crowded_edges, by_index.turned_edges, by_index.non_manifold_vertices];
-    for ((count, joined), forms) in as_it_is.into_iter().zip(joints).zip(JOINTS) {
+    for ((count, joined), nouns) in as_it_is.into_iter().zip(joined_counts).zip(JOINED) {
         if count > 0 && count != joined {
-            out += &format!("  {count:>8} {}, by the vertices' indices\n", form(count, forms));
+            out += &format!("  {count:>8} {}, by the vertices' indices\n", noun(count, nouns));
         }
     }
     if volume < 0.0 {
@@ -314,7 +315,7 @@ fn in_words(path: &Path, mesh: &TriMesh, faults: &Faults, bodies: &[Body]) -> St
 }
 
 /// Maximum number of bodies listed in text.
-const TOLD: usize = 8;
+const MAX_LISTED: usize = 8;
 
 /// Several bodies, the largest first; the rest only as a count.
 fn bodies_in_words(bodies: &[Body]) -> String {
@@ -327,22 +328,22 @@ fn bodies_in_words(bodies: &[Body]) -> String {
         let count = mesh.triangles.len();
         let genus = faults.genus.map_or("open".to_string(), |genus| format!("genus {genus}"));
         let (area, volume) = (faults.area, faults.volume);
-        let triangles = form(count, ["triangle", "triangles"]);
+        let triangles = noun(count, ["triangle", "triangles"]);
         format!("  body: {count} {triangles}, {genus}, area {area:.6} m2, volume {volume:.6} m3\n")
     };
-    let mut out: String = order.iter().take(TOLD).map(line).collect();
-    if let Some(others) = bodies.len().checked_sub(TOLD).filter(|others| *others > 0) {
-        out += &format!("  and {others} more {}\n", form(others, ["body", "bodies"]));
+    let mut out: String = order.iter().take(MAX_LISTED).map(line).collect();
+    if let Some(others) = bodies.len().checked_sub(MAX_LISTED).filter(|others| *others > 0) {
+        out += &format!("  and {others} more {}\n", noun(others, ["body", "bodies"]));
     }
     out
 }
 
 /// A line with a count and its noun.
-pub fn line(count: usize, forms: [&'static str; 2]) -> String {
-    format!("  {count:>8} {}\n", form(count, forms))
+pub fn count_line(count: usize, nouns: [&'static str; 2]) -> String {
+    format!("  {count:>8} {}\n", noun(count, nouns))
 }
 
 /// The noun for a count, singular or plural.
-pub fn form(count: usize, [one, several]: [&'static str; 2]) -> &'static str {
+pub fn noun(count: usize, [one, several]: [&'static str; 2]) -> &'static str {
     if count == 1 { one } else { several }
 }

@@ -12,13 +12,13 @@ use frazil::scene::FrameChoice;
 use frazil::{Error, Result};
 use serde_json::{Value, json};
 
-use super::{form, line};
+use super::{count_line, noun};
 use crate::cli::convert::{Losses, MeshFile, VELOCITY, check_output, prim_name};
 use crate::cli::options::{
-    MeshSpace, needs_frames, of_frame, one_frame, positive, refuse_one_file, warn_if_far,
+    MeshSpace, frame_path, needs_frames, one_frame, positive, refuse_one_file, warn_if_far,
 };
 use crate::cli::output;
-use crate::cli::session::{Failure, Phase, Session};
+use crate::cli::session::{Failure, OrFailure, Session};
 
 /// Make solids of meshes that are open, intersect themselves, or are inside out in parts.
 ///
@@ -57,28 +57,28 @@ pub struct Args {
 pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
     check_output(&args.output)?;
     let frames = args.frames()?;
-    output::check_writable(&args.output).before()?;
+    output::check_writable(&args.output).or_refuse()?;
     for frame in frames.iter() {
-        let from = of_frame(&args.input, frame);
+        let from = frame_path(&args.input, frame);
         // Report a gap in a sequence before any work.
-        io::files::source::open(&from).before()?;
-        output::refuse_input(&of_frame(&args.output, frame), [from.as_path()]).before()?;
+        io::files::source::open(&from).or_refuse()?;
+        output::refuse_input(&frame_path(&args.output, frame), [from.as_path()]).or_refuse()?;
     }
     let mut chosen = args.cell.map(Cell::given);
     let mut reports: Vec<Value> = Vec::new();
     for frame in frames.iter() {
-        session.ctx.check().during()?;
-        let (from, to) = (of_frame(&args.input, frame), of_frame(&args.output, frame));
+        session.ctx.check().or_fail()?;
+        let (from, to) = (frame_path(&args.input, frame), frame_path(&args.output, frame));
         let detail = args.read(&from);
         // Fail early if the first file cannot be repaired.
-        let detail = if reports.is_empty() { detail.before()? } else { detail.during()? };
+        let detail = if reports.is_empty() { detail.or_refuse()? } else { detail.or_fail()? };
         if reports.is_empty() {
-            args.warn_of_losses(&from, &detail).before()?;
+            args.warn_of_losses(&from, &detail).or_refuse()?;
         }
         let cell = *chosen.get_or_insert_with(|| Cell::of(&detail.mesh));
         let repaired = match repaired(session, &from, &detail.mesh, cell.edge) {
             Err(error @ Error::File { .. }) if reports.is_empty() => return Err(Failure::refused(error)),
-            repaired => repaired.during()?,
+            repaired => repaired.or_fail()?,
         };
         if let Some(what) = warning(&repaired) {
             log::warn!("{}: {what}", from.display());
@@ -90,16 +90,16 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
         if args.frames.is_some() {
             report["frame"] = json!(frame);
         }
-        let detail = if is_as_it_was(&detail.mesh, &repaired) {
+        let detail = if is_unchanged(&detail.mesh, &repaired) {
             detail
         } else {
             let Repaired { mesh, vertices, sources, .. } = repaired;
             let carry = || Ok(carry_attributes(&detail, mesh, &vertices, &sources, None));
-            session.ctx.phase("carry", carry).during()?
+            session.ctx.phase("carry", carry).or_fail()?
         };
-        args.write(&to, frame, &detail).during()?;
+        args.write(&to, frame, &detail).or_fail()?;
         if let Some(words) = words {
-            output::print(&words).during()?;
+            output::print(&words).or_fail()?;
         }
         reports.push(report);
     }
@@ -109,7 +109,7 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
     }
     let all =
         if args.frames.is_some() { json!(reports) } else { reports.into_iter().next().unwrap_or_default() };
-    output::print(&format!("{all:#}\n")).during()
+    output::print(&format!("{all:#}\n")).or_fail()
 }
 
 /// The error for a mesh that encloses nothing.
@@ -138,7 +138,7 @@ fn warning(repaired: &Repaired) -> Option<String> {
 }
 
 /// Whether a mesh needed no repair.
-fn is_as_it_was(mesh: &TriMesh, repaired: &Repaired) -> bool {
+fn is_unchanged(mesh: &TriMesh, repaired: &Repaired) -> bool {
     let count = mesh.triangles.len();
     let Repaired { mesh: after, report, .. } = repaired;
     report.prepared == Prepared::default()
@@ -153,18 +153,18 @@ struct Cell {
     /// Edge (m); 0 for a mesh without any extent.
     edge: f64,
     /// The reason for that edge.
-    why: &'static str,
+    reason: &'static str,
 }
 
 /// Minimum and maximum cell, as fractions of a mesh's longest side.
-const PARTS: [f64; 2] = [400.0, 40.0];
+const CELL_FRACTIONS: [f64; 2] = [400.0, 40.0];
 
 impl Cell {
     fn given(edge: f64) -> Self {
-        Self { edge, why: "" }
+        Self { edge, reason: "" }
     }
 
-    /// The default for a mesh, to three digits, so that the printed value can be passed as an option.
+    /// The default for a mesh, rounded to three digits, so that the printed value can be passed as an option.
     fn of(mesh: &TriMesh) -> Self {
         let mut lengths = Vec::with_capacity(3 * mesh.triangles.len());
         let (mut low, mut high) = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
@@ -179,15 +179,15 @@ impl Cell {
         }
         let middle = lengths.len() / 2;
         let median = *lengths.select_nth_unstable_by(middle, f64::total_cmp).1;
-        let [least, most] = PARTS.map(|part| (high - low).amax() / part);
-        let (edge, why) = if median < least {
-            (least, ", a 400th of the longest side")
-        } else if median > most {
-            (most, ", a 40th of the longest side")
+        let [min, max] = CELL_FRACTIONS.map(|part| (high - low).amax() / part);
+        let (edge, reason) = if median < min {
+            (min, ", a 400th of the longest side")
+        } else if median > max {
+            (max, ", a 40th of the longest side")
         } else {
             (median, ", the median edge")
         };
-        Self { edge: format!("{edge:.2e}").parse().unwrap_or(edge), why }
+        Self { edge: format!("{edge:.2e}").parse().unwrap_or(edge), reason }
     }
 }
 
@@ -216,7 +216,7 @@ impl Args {
             self.space.origin.read(path)?.into_detailed()
         };
         if !self.keeps_space() {
-            self.space.bring(&mut detail.mesh);
+            self.space.convert(&mut detail.mesh);
             // Velocities are not converted to another space.
             detail.arrays.retain(|array| !VELOCITY.contains(&&*array.name));
         }
@@ -242,7 +242,7 @@ fn report(mesh: &TriMesh, repaired: &Repaired, cell: Cell) -> Value {
     let Repaired { mesh: after, report, .. } = repaired;
     let done = &report.prepared;
     json!({
-        "solid_already": is_as_it_was(mesh, repaired),
+        "solid_already": is_unchanged(mesh, repaired),
         "joined_vertices": done.joined_vertices,
         "dropped_triangles": done.dropped_triangles,
         "turned_triangles": done.turned_triangles,
@@ -270,8 +270,8 @@ fn report(mesh: &TriMesh, repaired: &Repaired, cell: Cell) -> Value {
     })
 }
 
-/// What was done before anything is rebuilt: nouns for the counts of `in_words`.
-const DONE: [[&str; 2]; 5] = [
+/// What was done before rebuilding: nouns for the counts, singular and plural.
+const PREPARATIONS: [[&str; 2]; 5] = [
     [
         "vertex joined with another that is the same corner",
         "vertices joined with others that are the same corners",
@@ -285,7 +285,7 @@ const DONE: [[&str; 2]; 5] = [
     ["hole closed", "holes closed"],
 ];
 
-/// How far rebuilding extended beyond the faulty cells and those that they require.
+/// Texts for the rebuild levels: how far rebuilding extended beyond the faulty cells and those that they require.
 const REBUILD_LEVELS: [&str; 4] = [
     "",
     ", with a ring around",
@@ -297,7 +297,7 @@ const REBUILD_LEVELS: [&str; 4] = [
 fn in_words(from: &Path, to: &Path, before: &TriMesh, repaired: &Repaired, cell: Cell) -> String {
     let Repaired { mesh: after, report, .. } = repaired;
     let (file, output) = (from.display(), to.display());
-    if is_as_it_was(before, repaired) {
+    if is_unchanged(before, repaired) {
         return format!("{file} is a solid already: written as it is\n");
     }
     let is_lost = report.losses.warning(report.cell).is_some();
@@ -306,22 +306,22 @@ fn in_words(from: &Path, to: &Path, before: &TriMesh, repaired: &Repaired, cell:
     let done = &report.prepared;
     let counts =
         [done.joined_vertices, done.dropped_triangles, done.turned_triangles, done.turned_parts, done.holes];
-    for (count, forms) in counts.into_iter().zip(DONE).filter(|(count, _)| *count > 0) {
-        out += &line(count, forms);
+    for (count, nouns) in counts.into_iter().zip(PREPARATIONS).filter(|(count, _)| *count > 0) {
+        out += &count_line(count, nouns);
     }
-    let (used, Cell { edge, why }) = (report.cell, cell);
-    let why = if used < edge { format!(": {edge} m would have left nothing") } else { why.to_string() };
+    let (used, Cell { edge, reason }) = (report.cell, cell);
+    let reason = if used < edge { format!(": {edge} m would have left nothing") } else { reason.to_string() };
     let extent = REBUILD_LEVELS.get(report.rebuild_level).copied().unwrap_or_default();
     out += &format!(
-        "  cells of {used} m{why}\n  {:>8} {} flagged, {} rebuilt{extent}\n",
+        "  cells of {used} m{reason}\n  {:>8} {} flagged, {} rebuilt{extent}\n",
         report.flagged_cells,
-        form(report.flagged_cells, ["cell", "cells"]),
+        noun(report.flagged_cells, ["cell", "cells"]),
         report.rebuilt_cells
     );
     let (kept, made) = (report.kept_triangles, after.triangles.len() - report.kept_triangles);
     out += &format!("  {kept:>8} of {} triangles kept, {made} made\n", before.triangles.len());
     if report.slivers > 0 {
-        out += &line(report.slivers, ["of these is a sliver", "of these are slivers"]);
+        out += &count_line(report.slivers, ["of these is a sliver", "of these are slivers"]);
     }
     let (volume, after) = (before.volume(), after.volume());
     out + &format!("  volume {volume:.6} m3 before, {after:.6} m3 now\n")

@@ -20,7 +20,7 @@ const BROWN: [f32; 3] = [0.35, 0.16, 0.08];
 const STONE: [f32; 3] = [0.58, 0.54, 0.47];
 const STEEL: [f32; 3] = [0.24, 0.26, 0.29];
 /// Weight of the liquid's colour in a full stain.
-const STAINED: f64 = 0.6;
+const STAIN_WEIGHT: f64 = 0.6;
 /// The colour of static meshes in a liquid: linen.
 const LINEN: [f32; 3] = [0.78, 0.76, 0.70];
 /// The colour of the lines in which a cut intersects meshes.
@@ -30,7 +30,7 @@ const INK: [f32; 3] = [0.0; 3];
 pub struct Look {
     /// Pixels.
     pub size: Size,
-    /// The camera; none: one that sees everything.
+    /// The camera; none: one with everything in the picture.
     pub camera: Option<Camera>,
     /// The light; none: one beside the camera.
     pub light: Option<Light>,
@@ -52,8 +52,8 @@ pub struct Drawing {
     has_colors: bool,
     /// Whether any liquid is tinted.
     has_tint: bool,
-    /// Reasons why parts may be invisible: a fog without density, points that a cut leaves out.
-    hollow: Option<String>,
+    /// Why a part is invisible: a fog without density, or points that a cut leaves out.
+    invisible_reason: Option<String>,
 }
 
 /// All contents of a picture.
@@ -80,7 +80,8 @@ impl Look {
         if let Some(plane) = self.cut {
             return cut(ctx, parts, plane);
         }
-        let (mut models, mut clouds, mut fogs, mut hollow) = (Vec::new(), Vec::new(), Vec::new(), None);
+        let (mut models, mut clouds, mut fogs, mut invisible_reason) =
+            (Vec::new(), Vec::new(), Vec::new(), None);
         let (mut has_colors, mut has_tint) = (false, false);
         for part in parts {
             match part {
@@ -90,16 +91,17 @@ impl Look {
                     has_colors |= numbers.is_some();
                     models.push(if let Some(numbers) = numbers { model.coloured(&numbers) } else { model });
                 }
-                Part::Liquid(detailed, wet) => {
+                Part::Liquid(detailed, look) => {
                     let (numbers, tinted) =
                         (self.numbers(&detailed), self.tint.as_ref().and_then(|tint| tint.of(&detailed)));
                     has_colors |= numbers.is_some();
                     has_tint |= tinted.is_some();
-                    models.push(liquid(&detailed, wet.colour, numbers, tinted));
+                    models.push(liquid(&detailed, look.colour, numbers, tinted));
                 }
-                Part::Ground(mesh, stains, wet) => {
+                Part::Ground(mesh, stains, look) => {
                     let model = Model::mesh(&mesh, STONE);
-                    let stain = |share: &f64| mix(STONE, wet.colour, STAINED * share.clamp(0.0, 1.0));
+                    let stain =
+                        |share: &f64| interpolate(STONE, look.colour, STAIN_WEIGHT * share.clamp(0.0, 1.0));
                     let is_stained = stains.len() == mesh.positions.len();
                     let painted = is_stained.then(|| stains.iter().map(stain).collect());
                     models.push(if let Some(painted) = painted { model.painted(painted) } else { model });
@@ -118,7 +120,7 @@ impl Look {
                     let fog = fog.map_err(|error| error.in_file(&path))?;
                     if fog.is_empty() {
                         let what = format!("grid \"{}\" has no density above 0", grid.name());
-                        hollow = Some(invisible(&path, &what));
+                        invisible_reason = Some(log_invisible(&path, &what));
                     }
                     fogs.push(fog);
                 }
@@ -126,7 +128,7 @@ impl Look {
         }
         has_colors |= !clouds.is_empty();
         let models = Models::new(models).with_clouds(clouds).with_fogs(fogs);
-        Ok(Drawing { content: Content::Models(models), has_colors, has_tint, hollow })
+        Ok(Drawing { content: Content::Models(models), has_colors, has_tint, invisible_reason })
     }
 
     /// The numbers of the vertices that `--color` chooses.
@@ -134,7 +136,7 @@ impl Look {
         detailed.of_vertices(self.color.as_deref()?)
     }
 
-    /// The chosen camera and light, or ones that show all drawings in full.
+    /// The chosen camera and light, or ones that show all drawings completely.
     ///
     /// # Errors
     /// Nothing to see; nothing that `--color` can colour; a plane that misses everything.
@@ -153,8 +155,8 @@ impl Look {
         let boxes = drawings.iter().filter_map(|drawing| drawing.content.bounds());
         let bounds = boxes.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)));
         let bounds = bounds.ok_or_else(|| {
-            let hollow = drawings.iter().find_map(|drawing| drawing.hollow.as_deref());
-            let why = hollow.unwrap_or("the files are empty");
+            let invisible_reason = drawings.iter().find_map(|drawing| drawing.invisible_reason.as_deref());
+            let why = invisible_reason.unwrap_or("the files are empty");
             Failure::refused(format!("there is nothing to draw: {why}"))
         })?;
         if let Some(plane) = self.cut {
@@ -175,14 +177,16 @@ impl Look {
 /// Prepares parts to be cut by a plane: the first grid gives the colours, level sets and meshes become lines.
 #[cfg_attr(not(feature = "vdb"), expect(unused_variables, reason = "of grids only"))]
 fn cut(ctx: &Context, parts: Vec<Part>, plane: Plane) -> Result<Drawing> {
-    let (mut cut, mut hollow) = (Cut::new(plane), None);
+    let (mut cut, mut invisible_reason) = (Cut::new(plane), None);
     for part in parts {
         match part {
             Part::Mesh(detailed) | Part::Liquid(detailed, _) => cut = cut.with_surface(&detailed.mesh, INK),
             Part::Ground(mesh, ..) | Part::Obstacle(mesh) | Part::Cloth(mesh) => {
                 cut = cut.with_surface(&mesh, INK)
             }
-            Part::Points(path, _) => hollow = Some(invisible(&path, "points are left out of a cut")),
+            Part::Points(path, _) => {
+                invisible_reason = Some(log_invisible(&path, "points are left out of a cut"))
+            }
             #[cfg(feature = "vdb")]
             Part::Surface(grid) => {
                 let surface = level_set::to_mesh(ctx, &grid, 0.0, 0.0)?;
@@ -195,7 +199,7 @@ fn cut(ctx: &Context, parts: Vec<Part>, plane: Plane) -> Result<Drawing> {
     if let Some([low, high]) = cut.range() {
         log::info!("the colours of the cut go from {low}, dark blue, to {high}, pale yellow");
     }
-    Ok(Drawing { content: Content::Cut(cut), has_colors: false, has_tint: false, hollow })
+    Ok(Drawing { content: Content::Cut(cut), has_colors: false, has_tint: false, invisible_reason })
 }
 
 /// The surface of a liquid, coloured by numbers or tinted, if they are given; without opacities it hides the ground.
@@ -216,15 +220,15 @@ fn liquid(
     Model::liquid(mesh, colour, alpha.iter().map(|opacity| *opacity as f32).collect())
 }
 
-/// Logs and gives the reason why a part of a file is not seen.
-fn invisible(path: &Path, what: &str) -> String {
+/// Logs and returns the reason why a part of a file is invisible.
+fn log_invisible(path: &Path, what: &str) -> String {
     let what = format!("{}: {what}", path.display());
     log::info!("{what}");
     what
 }
 
 /// Interpolates two colours.
-fn mix(from: [f32; 3], to: [f32; 3], share: f64) -> [f32; 3] {
+fn interpolate(from: [f32; 3], to: [f32; 3], share: f64) -> [f32; 3] {
     [0, 1, 2].map(|n| from[n] + share as f32 * (to[n] - from[n]))
 }
 

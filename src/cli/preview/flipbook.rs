@@ -5,9 +5,9 @@ use std::path::Path;
 use super::drawing::{Drawing, Look, View};
 use super::in_order::in_order;
 use super::sources::Sources;
-use crate::cli::each::Each;
+use crate::cli::frame_results::FrameResults;
 use crate::cli::preview::parts::Part;
-use crate::cli::session::{Failure, Phase, Session};
+use crate::cli::session::{Failure, OrFailure, Session};
 use crate::cli::shot::progress::FrameProgress;
 use frazil::io::files::atomic;
 use frazil::io::files::sequence::Pattern;
@@ -15,9 +15,9 @@ use frazil::render::{Gif, Palette, Picture, delays};
 use frazil::{Error, Result};
 
 /// Maximum number of frames made at once: each holds its snow as triangles, and a memory limit applies to each of them.
-const MOST_AT_ONCE: usize = 4;
+const MAX_AT_ONCE: usize = 4;
 /// The colours of a GIF are chosen from pictures that are smaller by this factor along each edge.
-const SMALLER: u32 = 4;
+const PALETTE_REDUCTION: u32 = 4;
 
 /// Frames drawn with one camera.
 pub struct Flipbook<'a> {
@@ -32,8 +32,8 @@ pub struct Flipbook<'a> {
 }
 
 impl<'a> Flipbook<'a> {
-    /// Chooses the camera for some frames, ascending, at least one: it sees all of the first, the middle and
-    /// the last one, or of their neighbours if one cannot be drawn.
+    /// Chooses the camera for some frames, ascending, at least one, so that all of the first, the middle and the last one is in the picture.
+    /// For one of them that cannot be drawn, the nearest later frame is used, or else an earlier one.
     ///
     /// # Errors
     /// No frame that can be drawn; nothing to draw; cancel.
@@ -43,103 +43,100 @@ impl<'a> Flipbook<'a> {
         mut sources: Sources,
         frames: Vec<i32>,
     ) -> std::result::Result<Self, Failure> {
-        let mut positions = vec![0, frames.len() / 2, frames.len() - 1];
-        positions.dedup();
-        let mut probe = |position: usize| {
-            let frame = Some(f64::from(frames[position]));
+        let mut indices = vec![0, frames.len() / 2, frames.len() - 1];
+        indices.dedup();
+        let mut probe = |index: usize| {
+            let frame = Some(f64::from(frames[index]));
             sources.refuse_missing(frame)?;
             let parts = sources.read(&session.ctx, frame)?;
             look.build(&session.ctx, parts)
         };
-        let (mut probes, mut looked_at, mut first) = (Vec::new(), Vec::new(), None);
-        for wanted in positions {
-            // If one cannot be drawn, the next that can is used.
-            for position in (wanted..frames.len()).chain((0..wanted).rev()) {
-                if looked_at.contains(&position) {
+        let (mut probes, mut tried, mut first) = (Vec::new(), Vec::new(), None);
+        for wanted in indices {
+            for index in (wanted..frames.len()).chain((0..wanted).rev()) {
+                if tried.contains(&index) {
                     break;
                 }
-                looked_at.push(position);
-                match probe(position) {
+                tried.push(index);
+                match probe(index) {
                     Ok(drawing) => {
                         probes.push(drawing);
                         break;
                     }
                     Err(error @ (Error::Cancelled | Error::Argument(_) | Error::Memory { .. })) => {
-                        return Err(error).before();
+                        return Err(error).or_refuse();
                     }
                     Err(error) => _ = first.get_or_insert(error),
                 }
             }
         }
         if let Some(error) = first.filter(|_| probes.is_empty()) {
-            return Err(error).before();
+            return Err(error).or_refuse();
         }
         let view = look.view(&probes)?;
         Ok(Self { session, look, sources, frames, view, probes })
     }
 
-    /// Writes a PNG file of each frame, in their order, each whole or not at all; one that cannot be made does not cost the others.
+    /// Writes a PNG file of each frame atomically, in order; a frame that fails does not stop the others.
     ///
     /// # Errors
-    /// Files that cannot be read or written; cancel: the pictures of the frames before it are there.
+    /// Files that cannot be read or written; cancel, after which the pictures of earlier frames remain.
     pub fn pictures(mut self, pattern: &Pattern) -> std::result::Result<(), Failure> {
         self.probes.clear();
-        let (frames, mut each) = (self.frames.clone(), Each::default());
+        let (frames, mut results) = (self.frames.clone(), FrameResults::default());
         self.draw(
             |picture| picture.png(),
-            |position, png: Result<Vec<u8>>| {
-                let written = png.and_then(|png| atomic::write_bytes(&pattern.path(frames[position]), &png));
-                each.take(frames[position], written)
+            |index, png: Result<Vec<u8>>| {
+                let written = png.and_then(|png| atomic::write_bytes(&pattern.path(frames[index]), &png));
+                results.record(frames[index], written)
             },
         )?;
-        each.finish()
+        results.finish()
     }
 
-    /// Writes a GIF file, whole or not at all, that plays `fps` frames of the shot a second. Instead of a frame that cannot be drawn, the one
-    /// before is shown longer.
+    /// Writes a GIF file atomically that plays `fps` frames of the shot a second. Instead of a frame that cannot be drawn, the one before it is
+    /// shown longer.
     ///
     /// # Errors
     /// Frames that cannot be drawn; a file that cannot be written; cancel.
     pub fn gif(mut self, path: &Path, fps: f64) -> std::result::Result<(), Failure> {
-        let palette = self.palette().during()?;
+        let palette = self.palette().or_fail()?;
         self.probes.clear();
         let (delays, size) = (delays(&self.frames, fps), self.view.size);
-        let (frames, session, mut each) = (self.frames.clone(), self.session, Each::default());
-        // The first error of a frame, kept apart so that it is not reported as a write error.
-        let mut ended = None;
+        let (frames, session, mut results) = (self.frames.clone(), self.session, FrameResults::default());
+        // An error of a frame, kept separately so that it is not reported as a write error.
+        let mut frame_error = None;
         let written = atomic::write(path, |out| {
             let mut gif = Gif::new(out, size, &palette)?;
-            let (mut shown, mut waiting): (Option<Vec<u8>>, u16) = (None, 0);
-            let add = |position: usize,
-                       indices: Result<Vec<u8>>|
-             -> std::result::Result<Option<()>, Failure> {
-                let mut delay = delays[position];
-                match each.take(frames[position], indices)? {
-                    Some(indices) => {
-                        delay = delay.saturating_add(std::mem::take(&mut waiting));
-                        shown = Some(indices);
+            let (mut last_shown, mut pending_delay): (Option<Vec<u8>>, u16) = (None, 0);
+            let add = |index: usize, pixels: Result<Vec<u8>>| -> std::result::Result<Option<()>, Failure> {
+                let mut delay = delays[index];
+                match results.record(frames[index], pixels)? {
+                    Some(pixels) => {
+                        delay = delay.saturating_add(std::mem::take(&mut pending_delay));
+                        last_shown = Some(pixels);
                     }
-                    None if shown.is_none() => {
-                        waiting = waiting.saturating_add(delay);
+                    None if last_shown.is_none() => {
+                        pending_delay = pending_delay.saturating_add(delay);
                         return Ok(None);
                     }
                     None => {}
                 }
-                let indices = shown.clone().unwrap_or_default();
-                gif.add(indices, delay).map_err(|error| Failure::failed(Error::io(path, "write", error)))?;
+                let pixels = last_shown.clone().unwrap_or_default();
+                gif.add(pixels, delay).map_err(|error| Failure::failed(Error::io(path, "write", error)))?;
                 Ok(Some(()))
             };
             match self.draw(|picture| Ok(palette.indices(&session.ctx, &picture)), add) {
                 Ok(()) => gif.finish(),
                 Err(error) => {
-                    ended = Some(error);
+                    frame_error = Some(error);
                     Err(std::io::Error::other("the frames ended early"))
                 }
             }
         });
-        match ended {
+        match frame_error {
             Some(error) => Err(error),
-            None => written.during().and_then(|()| each.finish()),
+            None => written.or_fail().and_then(|()| results.finish()),
         }
     }
 
@@ -152,20 +149,20 @@ impl<'a> Flipbook<'a> {
     ) -> std::result::Result<(), Failure> {
         let Self { session, look, sources, frames, view, .. } = self;
         let ctx = &session.ctx;
-        let read = |position: usize| -> Result<Result<Vec<Part>>> {
+        let read = |index: usize| -> Result<Result<Vec<Part>>> {
             ctx.check()?;
             // An error of a frame is its own result.
-            let frame = Some(f64::from(frames[position]));
+            let frame = Some(f64::from(frames[index]));
             Ok(sources.refuse_missing(frame).and_then(|()| sources.read(ctx, frame)))
         };
         let make = |_, parts: Result<_>| {
             Ok(parts.and_then(|parts| finish(view.draw(ctx, &look.build(ctx, parts)?)?)))
         };
         let mut progress = FrameProgress::new(ctx, frames.len(), 0, session.is_quiet());
-        let at_once = ctx.pool().threads().min(MOST_AT_ONCE);
-        in_order(frames.len(), at_once, read, make, |position, made| {
-            if take(position, made)?.is_some() {
-                progress.finished("picture", frames[position]);
+        let at_once = ctx.pool().threads().min(MAX_AT_ONCE);
+        in_order(frames.len(), at_once, read, make, |index, made| {
+            if take(index, made)?.is_some() {
+                progress.finished("picture", frames[index]);
             }
             Ok(())
         })
@@ -173,7 +170,7 @@ impl<'a> Flipbook<'a> {
 
     /// Colours for all frames, from small pictures of some.
     fn palette(&self) -> Result<Palette> {
-        let small = self.view.smaller(SMALLER);
+        let small = self.view.smaller(PALETTE_REDUCTION);
         let draw = |probe: &Drawing| small.draw(&self.session.ctx, probe);
         let pictures = self.probes.iter().map(draw).collect::<Result<Vec<_>>>()?;
         Palette::of(&self.session.ctx, &pictures)

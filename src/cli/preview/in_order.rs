@@ -23,55 +23,56 @@ pub fn in_order<R, T: Send, E: From<Error>>(
     make: impl Fn(usize, R) -> Result<T> + Sync,
     mut take: impl FnMut(usize, T) -> std::result::Result<(), E>,
 ) -> std::result::Result<(), E> {
-    let (ask, jobs) = channel::<Job<T>>();
-    let (waiting, failed) = (Mutex::new((jobs, read)), AtomicBool::new(false));
+    let (sender, jobs) = channel::<Job<T>>();
+    let (queue, failed) = (Mutex::new((jobs, read)), AtomicBool::new(false));
     std::thread::scope(|scope| {
         for _ in 0..threads.max(1) {
-            scope.spawn(|| work(&waiting, &failed, &make));
+            scope.spawn(|| run_jobs(&queue, &failed, &make));
         }
         // Dropped with the closure; this ends the threads.
-        let ask = ask;
-        let mut begun: VecDeque<Receiver<Result<T>>> = VecDeque::new();
+        let sender = sender;
+        let mut in_flight: VecDeque<Receiver<Result<T>>> = VecDeque::new();
         let mut next = 0;
-        let mut one = |taken: usize| {
-            while next < count && begun.len() <= threads {
+        let mut take_next = |index: usize| {
+            while next < count && in_flight.len() <= threads {
                 let (done, made) = channel();
-                ask.send((next, done)).map_err(|_| gone())?;
-                begun.push_back(made);
+                sender.send((next, done)).map_err(|_| threads_ended())?;
+                in_flight.push_back(made);
                 next += 1;
             }
-            let made = begun.pop_front().ok_or_else(gone)?.recv().map_err(|_| gone())?;
-            take(taken, made?)
+            let made =
+                in_flight.pop_front().ok_or_else(threads_ended)?.recv().map_err(|_| threads_ended())?;
+            take(index, made?)
         };
-        let ended = (0..count).try_for_each(&mut one);
-        failed.store(ended.is_err(), Ordering::Relaxed);
-        ended
+        let result = (0..count).try_for_each(&mut take_next);
+        failed.store(result.is_err(), Ordering::Relaxed);
+        result
     })
 }
 
 /// Takes jobs until none are left.
-fn work<R, T>(
-    waiting: &Mutex<(Receiver<Job<T>>, impl FnMut(usize) -> Result<R>)>,
+fn run_jobs<R, T>(
+    queue: &Mutex<(Receiver<Job<T>>, impl FnMut(usize) -> Result<R>)>,
     failed: &AtomicBool,
     make: &impl Fn(usize, R) -> Result<T>,
 ) {
     loop {
-        // One thread waits for a job and reads it while the others process theirs; a panic there ends them all.
-        let Ok(mut turn) = waiting.lock() else { return };
-        let (jobs, read) = &mut *turn;
+        // One thread at a time waits for a job and reads it, while the others process theirs. A panic there poisons the lock and ends all.
+        let Ok(mut guard) = queue.lock() else { return };
+        let (jobs, read) = &mut *guard;
         let Ok((frame, done)) = jobs.recv() else { return };
         // Jobs that were sent before a frame failed are still in the channel.
         if failed.load(Ordering::Relaxed) {
             return;
         }
         let raw = read(frame);
-        drop(turn);
+        drop(guard);
         // The receiver is gone if an earlier frame failed.
         let _ = done.send(raw.and_then(|raw| make(frame, raw)));
     }
 }
 
-fn gone() -> Error {
+fn threads_ended() -> Error {
     Error::Internal("the threads that make frames are gone".into())
 }
 

@@ -6,15 +6,15 @@ mod flipbook;
 mod grids;
 mod in_order;
 mod parts;
+mod shallow_folder;
 #[cfg(feature = "vdb")]
-mod shot;
+mod shot_folder;
 mod sources;
-mod spill;
 mod tint;
 
 use std::path::{Path, PathBuf};
 
-use super::session::{Failure, Phase, Session};
+use super::session::{Failure, OrFailure, Session};
 use super::{options, output};
 use drawing::Look;
 use flipbook::Flipbook;
@@ -123,15 +123,15 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     let look = args.look()?;
     #[cfg(feature = "vdb")]
     session.ctx.set_memory_limit(session.max_memory());
-    let sources = Sources::open(&args.files, args.clip.clone(), args.fps).before()?;
+    let sources = Sources::open(&args.files, args.clip.clone(), args.fps).or_refuse()?;
     args.refuse_idle_options(&sources)?;
     let job = args.job(&sources)?;
-    job.check(&sources).before()?;
+    job.check(&sources).or_refuse()?;
     match job {
         Job::Still(frame, path) => still(session, &look, sources, frame, &path),
         Job::Pictures(frames, pattern) => Flipbook::open(session, &look, sources, frames)?.pictures(&pattern),
         Job::Gif(frames, path) => {
-            let fps = sources.fps().before()?;
+            let fps = sources.fps().or_refuse()?;
             Flipbook::open(session, &look, sources, frames)?.gif(&path, fps)
         }
     }
@@ -145,10 +145,10 @@ fn still(
     frame: Option<f64>,
     path: &Path,
 ) -> Result<(), Failure> {
-    let parts = sources.read(&session.ctx, frame).before()?;
-    let drawing = look.build(&session.ctx, parts).before()?;
+    let parts = sources.read(&session.ctx, frame).or_refuse()?;
+    let drawing = look.build(&session.ctx, parts).or_refuse()?;
     let view = look.view(std::slice::from_ref(&drawing))?;
-    view.draw(&session.ctx, &drawing).and_then(|picture| picture.write(path)).during()
+    view.draw(&session.ctx, &drawing).and_then(|picture| picture.write(path)).or_fail()
 }
 
 impl Args {
@@ -231,16 +231,16 @@ impl Job {
     fn check(&self, sources: &Sources) -> frazil::Result<()> {
         let (first, frames) = match self {
             Self::Still(frame, path) => (path.clone(), vec![*frame]),
-            Self::Pictures(frames, pattern) => (pattern.path(frames[0]), some(frames)),
-            Self::Gif(frames, path) => (path.clone(), some(frames)),
+            Self::Pictures(frames, pattern) => (pattern.path(frames[0]), as_options(frames)),
+            Self::Gif(frames, path) => (path.clone(), as_options(frames)),
         };
         output::check_writable(&first)?;
-        frames.iter().try_for_each(|frame| sources.refuse_beyond(*frame))?;
+        frames.iter().try_for_each(|frame| sources.refuse_missing_in_shots(*frame))?;
         let missing = frames.into_iter().map(|frame| sources.refuse_missing(frame));
         missing.reduce(|first, next| if next.is_ok() { next } else { first }).unwrap_or(Ok(()))
     }
 }
 
-fn some(frames: &[i32]) -> Vec<Option<f64>> {
+fn as_options(frames: &[i32]) -> Vec<Option<f64>> {
     frames.iter().map(|frame| Some(f64::from(*frame))).collect()
 }

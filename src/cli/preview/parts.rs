@@ -1,4 +1,4 @@
-//! What a picture shows.
+//! The parts of a picture, and folders that they are read from.
 
 use std::path::{Path, PathBuf};
 
@@ -12,9 +12,9 @@ pub enum Part {
     /// A mesh with its arrays.
     Mesh(DetailedMesh),
     /// The surface of a liquid, with its opacities `alpha`, and the kind of liquid.
-    Liquid(DetailedMesh, Wet),
+    Liquid(DetailedMesh, LiquidLook),
     /// The ground below a liquid, with the stains on its vertices, 0 to 1, and the liquid that left them; stains are optional.
-    Ground(TriMesh, Vec<f64>, Wet),
+    Ground(TriMesh, Vec<f64>, LiquidLook),
     /// A tool or an obstacle in a liquid.
     Obstacle(TriMesh),
     /// A static mesh in a liquid.
@@ -72,7 +72,7 @@ pub trait Folder: Send {
 
 /// The look of a liquid.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wet {
+pub struct LiquidLook {
     pub name: &'static str,
     /// Linear red, green, blue.
     pub colour: [f32; 3],
@@ -80,14 +80,14 @@ pub struct Wet {
     pub depth: f64,
 }
 
-impl Wet {
+impl LiquidLook {
     pub const WATER: Self = Self { name: "water", colour: [0.02, 0.16, 0.20], depth: 0.05 };
     pub const BLOOD: Self = Self { name: "blood", colour: [0.30, 0.008, 0.006], depth: 0.0004 };
     const PAINT: Self = Self { name: "paint", colour: [0.05, 0.20, 0.60], depth: 0.0002 };
     const HONEY: Self = Self { name: "honey", colour: [0.70, 0.32, 0.02], depth: 0.012 };
     pub const MILK: Self = Self { name: "milk", colour: [0.86, 0.84, 0.78], depth: 0.0004 };
     const COFFEE: Self = Self { name: "coffee", colour: [0.045, 0.013, 0.004], depth: 0.0012 };
-    /// Those of dyes.
+    /// The looks of dyes.
     pub const DYES: [Self; 5] = [Self::BLOOD, Self::PAINT, Self::HONEY, Self::MILK, Self::COFFEE];
 
     /// The liquid of a name in a scene; blood if the name is unknown.
@@ -102,8 +102,8 @@ impl Wet {
 /// # Errors
 /// A file that cannot be read.
 pub fn points_of(path: &Path) -> Result<Part> {
-    let cloud = io::particles::read(path)?;
-    let voxel = cloud.voxel_size.unwrap_or(0.01);
-    let points = cloud.into_points(Some(voxel)).map_err(|error| Error::file(path, error.to_string()))?;
+    let data = io::particles::read(path)?;
+    let voxel = data.voxel_size.unwrap_or(0.01);
+    let points = data.into_points(Some(voxel)).map_err(|error| Error::file(path, error.to_string()))?;
     Ok(Part::Points(path.to_path_buf(), points))
 }

@@ -10,9 +10,9 @@ use frazil::{Context, Error, Result, io};
 #[cfg(feature = "vdb")]
 use super::grids::of_vdb;
 use super::parts::{Folder, Part, points_of};
+use super::shallow_folder::ShallowFolder;
 #[cfg(feature = "vdb")]
-use super::shot::Shot;
-use super::spill::Spill;
+use super::shot_folder::ShotFolder;
 
 /// An input to draw.
 enum Source {
@@ -30,7 +30,7 @@ pub struct Sources {
 }
 
 /// Frames a second if neither the user nor a shot gives them.
-const FPS: f64 = 24.0;
+const DEFAULT_FPS: f64 = 24.0;
 
 impl Sources {
     /// Opens files, patterns of sequences and folders of shots. Characters play `clip`; without it their only one.
@@ -49,7 +49,7 @@ impl Sources {
     pub fn fps(&self) -> Result<f64> {
         match self.fps {
             Some(fps) => Ok(fps),
-            None => Ok(self.all.iter().find_map(Source::fps).transpose()?.unwrap_or(FPS)),
+            None => Ok(self.all.iter().find_map(Source::fps).transpose()?.unwrap_or(DEFAULT_FPS)),
         }
     }
 
@@ -84,7 +84,7 @@ impl Sources {
     ///
     /// # Errors
     /// Names what is missing.
-    pub fn refuse_beyond(&self, frame: Option<f64>) -> Result<()> {
+    pub fn refuse_missing_in_shots(&self, frame: Option<f64>) -> Result<()> {
         let shots = self.all.iter().filter(|source| !matches!(source, Source::Sequence(_)));
         shots.into_iter().try_for_each(|source| source.refuse_missing(frame))
     }
@@ -95,16 +95,16 @@ impl Sources {
     /// A file that cannot be read; cancel.
     pub fn read(&mut self, ctx: &Context, frame: Option<f64>) -> Result<Vec<Part>> {
         let mut parts = Vec::new();
-        let fps = if self.has_characters() { self.fps()? } else { FPS };
+        let fps = if self.has_characters() { self.fps()? } else { DEFAULT_FPS };
         for source in &mut self.all {
             match source {
-                Source::File(path) => parts.extend(of_file(path, self.clip.as_deref(), frame, fps)?),
+                Source::File(path) => parts.extend(read_file(path, self.clip.as_deref(), frame, fps)?),
                 Source::Sequence(pattern) => {
-                    let path = pattern.path(whole(frame, &pattern.path(0))?);
-                    parts.extend(of_file(&path, None, None, fps)?);
+                    let path = pattern.path(whole_frame(frame, &pattern.path(0))?);
+                    parts.extend(read_file(&path, None, None, fps)?);
                 }
                 Source::Folder(folder) => {
-                    let frame = whole(frame, folder.path())?;
+                    let frame = whole_frame(frame, folder.path())?;
                     parts.extend(folder.read(ctx, frame)?);
                 }
             }
@@ -116,11 +116,11 @@ impl Sources {
 impl Source {
     fn open(path: &Path) -> Result<Self> {
         if path.is_dir() {
-            if let Some(spill) = Spill::open(path)? {
-                return Ok(Self::Folder(Box::new(spill)));
+            if let Some(folder) = ShallowFolder::open(path)? {
+                return Ok(Self::Folder(Box::new(folder)));
             }
             #[cfg(feature = "vdb")]
-            return Ok(Self::Folder(Box::new(Shot::open(path)?)));
+            return Ok(Self::Folder(Box::new(ShotFolder::open(path)?)));
             #[cfg(not(feature = "vdb"))]
             return crate::cli::needs_openvdb(path);
         }
@@ -141,16 +141,16 @@ impl Source {
         match self {
             Self::File(_) => Ok(()),
             Self::Sequence(pattern) => {
-                let path = pattern.path(whole(frame, &pattern.path(0))?);
+                let path = pattern.path(whole_frame(frame, &pattern.path(0))?);
                 if path.is_file() { Ok(()) } else { Err(Error::file(path, "is not there")) }
             }
-            Self::Folder(folder) => folder.refuse_missing(whole(frame, folder.path())?),
+            Self::Folder(folder) => folder.refuse_missing(whole_frame(frame, folder.path())?),
         }
     }
 }
 
 /// The frame number for an input that has whole frames only.
-fn whole(frame: Option<f64>, name: &Path) -> Result<i32> {
+fn whole_frame(frame: Option<f64>, name: &Path) -> Result<i32> {
     match frame {
         Some(frame) if frame.fract() == 0.0 && frame.abs() <= 1.0e9 => Ok(frame as i32),
         Some(frame) => Err(Error::file(name, format!("has whole frames only, and --frame is {frame}"))),
@@ -162,19 +162,19 @@ fn whole(frame: Option<f64>, name: &Path) -> Result<i32> {
 }
 
 /// Reads a file; a character is posed by its clip if a clip or a frame is given.
-fn of_file(path: &Path, clip: Option<&str>, frame: Option<f64>, fps: f64) -> Result<Vec<Part>> {
-    let bare = |mesh: TriMesh| DetailedMesh { mesh, ..DetailedMesh::default() };
+fn read_file(path: &Path, clip: Option<&str>, frame: Option<f64>, fps: f64) -> Result<Vec<Part>> {
+    let without_data = |mesh: TriMesh| DetailedMesh { mesh, ..DetailedMesh::default() };
     let mesh = match io::mesh::extension(path).as_str() {
         #[cfg(feature = "vdb")]
         "vdb" => return of_vdb(path),
         #[cfg(not(feature = "vdb"))]
         "vdb" => return crate::cli::needs_openvdb(path),
         "ply" if io::particles::ply::holds_points(path)? => return Ok(vec![points_of(path)?]),
-        _ if crate::cli::points::is_named(path) => return Ok(vec![points_of(path)?]),
-        _ if is_gltf(path) && clip.is_none() && frame.is_none() => bare(Character::at_rest(path)?),
+        _ if crate::cli::points::is_point_file(path) => return Ok(vec![points_of(path)?]),
+        _ if is_gltf(path) && clip.is_none() && frame.is_none() => without_data(Character::at_rest(path)?),
         _ if is_gltf(path) => {
             let play = Play { clip: clip.map(String::from), ..Play::default() };
-            bare(Character::posed(path, play, (frame.unwrap_or(1.0) - 1.0) / fps)?)
+            without_data(Character::posed(path, play, (frame.unwrap_or(1.0) - 1.0) / fps)?)
         }
         _ => io::mesh::read_any(path)?.into_detailed().without_unused(),
     };

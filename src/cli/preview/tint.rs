@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use crate::cli::preview::parts::Wet;
+use crate::cli::preview::parts::LiquidLook;
 use frazil::geometry::DetailedMesh;
 
 /// A scalar that tints a liquid.
@@ -10,7 +10,7 @@ use frazil::geometry::DetailedMesh;
 pub struct Tint {
     /// The scalar: 0 is water, 1 the full dye.
     pub name: String,
-    look: Wet,
+    look: LiquidLook,
 }
 
 /// Colours (linear red, green, blue) and opacities of vertices.
@@ -22,24 +22,24 @@ impl FromStr for Tint {
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || "write a scalar and what it looks like, such as dye=blood: blood, paint, honey, milk or coffee";
         let (name, look) = text.split_once('=').ok_or_else(wrong)?;
-        let look = Wet::DYES.into_iter().find(|known| known.name == look).ok_or_else(wrong)?;
+        let look = LiquidLook::DYES.into_iter().find(|known| known.name == look).ok_or_else(wrong)?;
         Ok(Self { name: name.into(), look })
     }
 }
 
 impl Tint {
-    /// The fraction of light that remains after passing through liquid of these depths and concentrations (Lambert, Beer); none for a mesh
-    /// that lacks either.
+    /// The colours and opacities of vertices, from their depths and concentrations of dye (Lambert, Beer); none for a mesh that lacks either
+    /// array.
     pub fn of(&self, liquid: &DetailedMesh) -> Option<Tinted> {
         let (shares, depths) = (liquid.of_vertices(&self.name)?, liquid.of_vertices("depth")?);
-        let [clear, dye] = [Wet::WATER, self.look].map(|look| (look.colour, 1.0 / look.depth));
+        let [clear, dye] = [LiquidLook::WATER, self.look].map(|look| (look.colour, 1.0 / look.depth));
         let vertex = |(share, depth): (f64, f64)| {
             let share = share.clamp(0.0, 1.0);
             let [clear_part, dye_part] = [(1.0 - share) * clear.1, share * dye.1];
-            let all = clear_part + dye_part;
-            let mix = (dye_part / all) as f32;
+            let absorption = clear_part + dye_part;
+            let mix = (dye_part / absorption) as f32;
             let colour = [0, 1, 2].map(|n| (1.0 - mix) * clear.0[n] + mix * dye.0[n]);
-            (colour, (1.0 - libm::exp(-depth.max(0.0) * all)) as f32)
+            (colour, (1.0 - libm::exp(-depth.max(0.0) * absorption)) as f32)
         };
         Some(shares.into_iter().zip(depths).map(vertex).unzip())
     }
@@ -65,7 +65,7 @@ mod tests {
         let (colours, opacities) = tint.of(&DetailedMesh { mesh, uvs: None, arrays }).unwrap();
         assert!(opacities.windows(2).take(2).all(|two| two[0] < two[1]), "{opacities:?}");
         assert!(opacities[0] < 0.05 && opacities[2] > 0.9 && opacities[3] == 0.0, "{opacities:?}");
-        assert_eq!((colours[0], colours[2]), (Wet::WATER.colour, Wet::MILK.colour));
+        assert_eq!((colours[0], colours[2]), (LiquidLook::WATER.colour, LiquidLook::MILK.colour));
         assert!("milk".parse::<Tint>().is_err() && "milk=snow".parse::<Tint>().is_err());
     }
 }

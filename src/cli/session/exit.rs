@@ -1,4 +1,4 @@
-//! How the program ends: exit codes and the one sentence on stderr.
+//! Exit codes, and the sentence on stderr when a command fails.
 
 use frazil::Error;
 use std::io::Write;
@@ -28,45 +28,45 @@ impl Failure {
         Self { code: REFUSED, message: message.to_string() }
     }
 
-    /// As [`Failure::refused`], with the name of the file at fault.
+    /// As [`Failure::refused`], with the name of the faulty file.
     pub fn of_file(path: &Path, what: impl std::fmt::Display) -> Self {
         Self::refused(format!("{}: {what}", path.display()))
     }
 
-    /// An error after that: exit code 1.
+    /// An error after the work has begun: exit code 1.
     pub fn failed(message: impl std::fmt::Display) -> Self {
         Self { code: FAILED, message: message.to_string() }
     }
 
     /// Prints the message and returns the exit code.
     pub fn report(&self) -> u8 {
-        say_error(&self.message);
+        print_error(&self.message);
         self.code
     }
 }
 
-/// Adds the part of a command in which an error arose.
-pub trait Phase<T> {
-    /// Before the work began: exit code 2.
-    fn before(self) -> Result<T, Failure>;
-    /// After it began: exit code 1, but 2 for arguments and memory, which are checked beforehand.
-    fn during(self) -> Result<T, Failure>;
+/// Converts an error of the library to the failure of a command.
+pub trait OrFailure<T> {
+    /// For an error before the work begins: exit code 2, or 75 if another run is at work in the folder.
+    fn or_refuse(self) -> Result<T, Failure>;
+    /// For an error of the work: exit code 1, but 2 for arguments and memory, which are checked before any of it is done.
+    fn or_fail(self) -> Result<T, Failure>;
 }
 
-impl<T> Phase<T> for frazil::Result<T> {
-    fn before(self) -> Result<T, Failure> {
+impl<T> OrFailure<T> for frazil::Result<T> {
+    fn or_refuse(self) -> Result<T, Failure> {
         self.map_err(|error| match error {
             Error::Busy(_) => Failure { code: BUSY, message: error.to_string() },
             error => Failure::refused(error),
         })
     }
 
-    fn during(self) -> Result<T, Failure> {
+    fn or_fail(self) -> Result<T, Failure> {
         self.map_err(Failure::from)
     }
 }
 
-/// As [`Phase::during`].
+/// As [`OrFailure::or_fail`].
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         match error {
@@ -77,7 +77,7 @@ impl From<Error> for Failure {
 }
 
 /// Prints one sentence on stderr, without the line breaks of its parts.
-pub fn say_error(message: &str) {
+pub fn print_error(message: &str) {
     let message = frazil::error::visible(message);
     let sentence: Vec<&str> = message.split_whitespace().collect();
     // If stderr is closed, there is nowhere to report to.
@@ -85,19 +85,19 @@ pub fn say_error(message: &str) {
 }
 
 /// Reports that a signal stopped the program; its exit code shows which.
-pub fn say_stopped(code: u8) {
-    static SAID: AtomicBool = AtomicBool::new(false);
-    if SAID.swap(true, Ordering::Relaxed) {
+pub fn print_stopped(code: u8) {
+    static PRINTED: AtomicBool = AtomicBool::new(false);
+    if PRINTED.swap(true, Ordering::Relaxed) {
         return;
     }
-    say_error(if code == 130 { "interrupted" } else { "terminated" });
+    print_error(if code == 130 { "interrupted" } else { "terminated" });
 }
 
 /// Turns a panic, in any thread, into one sentence.
 pub fn install_panic_hook() {
-    static TOLD: AtomicBool = AtomicBool::new(false);
+    static PRINTED: AtomicBool = AtomicBool::new(false);
     std::panic::set_hook(Box::new(|panic| {
-        if TOLD.swap(true, Ordering::Relaxed) {
+        if PRINTED.swap(true, Ordering::Relaxed) {
             return;
         }
         let payload = panic.payload();
@@ -108,6 +108,6 @@ pub fn install_panic_hook() {
         };
         let position =
             panic.location().map(|at| format!(" ({}:{})", at.file(), at.line())).unwrap_or_default();
-        say_error(&format!("internal error: {what}{position}; please report it"));
+        print_error(&format!("internal error: {what}{position}; please report it"));
     }));
 }

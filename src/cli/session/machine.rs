@@ -4,13 +4,13 @@ use std::str::FromStr;
 
 use frazil::context::machine_memory;
 
-/// An amount of memory: bytes, or a part of the machine's.
+/// An amount of memory: bytes, or a share of the machine's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Amount {
-    /// So many bytes.
+    /// A count of bytes.
     Bytes(u64),
-    /// A part of the machine's memory, 0..=1.
-    Part(f64),
+    /// A share of the machine's memory, 0..=1.
+    Share(f64),
 }
 
 impl Amount {
@@ -18,7 +18,7 @@ impl Amount {
     pub fn bytes(self) -> u64 {
         match self {
             Self::Bytes(bytes) => bytes,
-            Self::Part(part) => machine_memory().map_or(u64::MAX, |bytes| (bytes as f64 * part) as u64),
+            Self::Share(share) => machine_memory().map_or(u64::MAX, |bytes| (bytes as f64 * share) as u64),
         }
     }
 }
@@ -33,7 +33,7 @@ impl FromStr for Amount {
         let unit = text[split..].to_uppercase();
         let base = if unit.contains('I') { 1024.0f64 } else { 1000.0 };
         let power = match unit.trim_end_matches('B').trim_end_matches('I') {
-            "%" if (0.0..=100.0).contains(&number) => return Ok(Self::Part(number / 100.0)),
+            "%" if (0.0..=100.0).contains(&number) => return Ok(Self::Share(number / 100.0)),
             "" => 0,
             "K" => 1,
             "M" => 2,
@@ -62,7 +62,7 @@ mod tests {
         assert_eq!("1.5 MB".parse(), Ok(Amount::Bytes(1_500_000)));
         assert_eq!("1.5 MiB".parse(), Ok(Amount::Bytes(3 << 19)));
         assert_eq!("100".parse(), Ok(Amount::Bytes(100)));
-        assert_eq!("50%".parse(), Ok(Amount::Part(0.5)));
+        assert_eq!("50%".parse(), Ok(Amount::Share(0.5)));
         for wrong in ["", "G", "-1G", "150%", "8 parsecs", "nan"] {
             assert!(wrong.parse::<Amount>().is_err(), "{wrong}");
         }

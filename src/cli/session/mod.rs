@@ -7,7 +7,7 @@ mod signals;
 pub(in crate::cli) mod usage;
 
 use super::output;
-pub use exit::{Failure, Phase};
+pub use exit::{Failure, OrFailure};
 use frazil::context::{PhaseTime, Phases, peak_memory};
 #[cfg(feature = "vdb")]
 use frazil::vdb::reading::guard::{self, Guard};
@@ -59,7 +59,7 @@ impl Session {
             Some(threads) => Pool::new(threads.into()),
             None => Pool::all_cores(),
         };
-        let ctx = Context::new(pool.before()?);
+        let ctx = Context::new(pool.or_refuse()?);
         let phases = ctx.collect();
         let signals = Signals::install(ctx.cancel_flags())
             .map_err(|error| Failure::refused(format!("cannot install signal handlers: {error}")))?;
@@ -74,7 +74,7 @@ impl Session {
             cancel,
         });
         if let Some(path) = &globals.report {
-            output::check_report(path).before()?;
+            output::check_report(path).or_refuse()?;
         }
         Ok(Self { ctx, phases, globals, signals, start: Instant::now(), results: Mutex::default() })
     }
@@ -104,13 +104,13 @@ impl Session {
     /// Writes the report, prints the error if there is one, and returns the exit code.
     pub fn finish(&self, result: Result<(), Failure>) -> u8 {
         let result = match (&self.globals.report, result) {
-            (Some(path), Ok(())) => self.write_report(path).during(),
+            (Some(path), Ok(())) => self.write_report(path).or_fail(),
             (_, result) => result,
         };
         match (result, self.signals.received()) {
             (Ok(()), _) => exit::DONE,
             (Err(_), Some(code)) => {
-                exit::say_stopped(code);
+                exit::print_stopped(code);
                 code
             }
             (Err(failure), None) => failure.report(),

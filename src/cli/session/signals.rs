@@ -1,5 +1,5 @@
-//! Ctrl-C and SIGTERM raise the cancel flags; a second one ends the program at once, and so does the first if the work
-//! does not stop by itself: it may be waiting for a file.
+//! Ctrl-C and SIGTERM raise the cancel flags. A second signal ends the program at once; so does the first, after a grace period, if the
+//! work does not stop, for instance because it waits for a file.
 
 use signal_hook::consts::signal::{SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
@@ -12,9 +12,9 @@ use super::exit;
 /// Time that the work may take to stop.
 const GRACE: Duration = Duration::from_millis(700);
 /// Interval between checks for a signal.
-const LOOK: Duration = Duration::from_millis(50);
+const CHECK_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Which signal came, if one did.
+/// The signal that was received, if any.
 pub struct Signals {
     code: Arc<AtomicUsize>,
 }
@@ -40,24 +40,24 @@ impl Signals {
         Ok(signals)
     }
 
-    /// Ends the program some time after a signal, whatever it is doing: at any moment, files are whole or not there.
+    /// Ends the program some time after a signal, whatever it is doing. This is safe at any moment, as files are written atomically.
     fn watch(&self) -> std::io::Result<()> {
         let code = self.code.clone();
         let watch = move || {
             while code.load(Ordering::Relaxed) == 0 {
-                std::thread::sleep(LOOK);
+                std::thread::sleep(CHECK_INTERVAL);
             }
             std::thread::sleep(GRACE);
             let code = code.load(Ordering::Relaxed) as u8;
             frazil::io::files::atomic::abandon();
-            exit::say_stopped(code);
+            exit::print_stopped(code);
             // Destructors of other threads' data must not run.
             signal_hook::low_level::exit(code.into());
         };
         std::thread::Builder::new().name("signals".into()).spawn(watch).map(drop)
     }
 
-    /// The exit code of the signal that came: 130 or 143.
+    /// The exit code of the received signal: 130 or 143.
     pub fn received(&self) -> Option<u8> {
         match self.code.load(Ordering::Relaxed) {
             0 => None,

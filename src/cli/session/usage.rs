@@ -13,7 +13,7 @@ pub fn report(error: &Error) -> u8 {
     }
     let text = error.render().to_string();
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        exit::say_error("a command is missing; see `frazil --help`");
+        exit::print_error("a command is missing; see `frazil --help`");
         return exit::REFUSED;
     }
     // clap prints a headline, maybe a list and a tip, then the usage; the first two describe the error.
@@ -23,6 +23,6 @@ pub fn report(error: &Error) -> u8 {
     let message = message.split_once(" For more information").map_or(message, |parts| parts.0);
     let message =
         message.replace("tip:", ";").split_whitespace().collect::<Vec<_>>().join(" ").replace(" ;", ";");
-    exit::say_error(&format!("{message}; see `frazil --help`"));
+    exit::print_error(&format!("{message}; see `frazil --help`"));
     exit::REFUSED
 }

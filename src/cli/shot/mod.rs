@@ -14,7 +14,7 @@ use frazil::scene::run::{Pipeline, Report, Run};
 use frazil::scene::{FrameChoice, Override, Scene};
 
 use super::output;
-use super::session::{Failure, Phase, Session};
+use super::session::{Failure, OrFailure, Session};
 use progress::FrameProgress;
 
 /// The output of a shot, and the part of it to make.
@@ -52,26 +52,27 @@ impl ShotArgs {
         Ok(frames)
     }
 
-    /// Makes the frames of a pipeline; `seen` is called with the report of each, by one thread at a time.
+    /// Makes the frames of a pipeline; `on_report` is called with the report of each, by one thread at a time.
     pub fn make(
         &self,
         session: &Session,
         pipeline: &Pipeline<'_>,
         stages: &[String],
         frames: &FrameChoice,
-        seen: impl FnMut(&Report) + Send,
+        on_report: impl FnMut(&Report) + Send,
     ) -> Result<(), Failure> {
-        let run = Run::prepare(&session.ctx, pipeline, &self.output, stages, frames, self.from).before()?;
-        output::check_folder(&self.output).before()?;
+        let run =
+            Run::prepare(&session.ctx, pipeline, &self.output, stages, frames, self.from).or_refuse()?;
+        output::check_folder(&self.output).or_refuse()?;
         let (to_make, existing) = (run.to_make(), run.existing());
-        let shown =
-            Mutex::new((FrameProgress::new(&session.ctx, to_make, existing, session.is_quiet()), seen));
+        let display =
+            Mutex::new((FrameProgress::new(&session.ctx, to_make, existing, session.is_quiet()), on_report));
         run.make(&session.ctx, |stage, frame, report| {
-            let mut shown = shown.lock().expect("nobody panics with this lock");
-            (shown.1)(report);
-            shown.0.finished(stage, frame);
+            let mut display = display.lock().expect("no panic holds this lock");
+            (display.1)(report);
+            display.0.finished(stage, frame);
         })
-        .during()?;
+        .or_fail()?;
         session.record("frames", to_make.into());
         session.record("frames_there", existing.into());
         Ok(())

@@ -7,7 +7,7 @@ use frazil::scene::{Scene, shallow};
 use serde_json::{Map, Value, json};
 
 use super::ShotArgs;
-use crate::cli::session::{Failure, Phase, Session};
+use crate::cli::session::{Failure, OrFailure, Session};
 
 /// Let a little liquid flow over a terrain: blood, water, paint, honey.
 ///
@@ -29,12 +29,12 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let scene = Scene::read_with(&args.scene, &args.shot.set).before()?;
-    scene.shallow().before()?;
+    let scene = Scene::read_with(&args.scene, &args.shot.set).or_refuse()?;
+    scene.shallow().or_refuse()?;
     let frames = args.shot.frames(&scene)?;
     session.ctx.set_memory_limit(session.max_memory());
-    let inputs = shallow::Inputs::load(&session.ctx, &scene).before()?;
-    let pipeline = shallow::pipeline(&session.ctx, &scene, &inputs).before()?;
+    let inputs = shallow::Inputs::load(&session.ctx, &scene).or_refuse()?;
+    let pipeline = shallow::pipeline(&session.ctx, &scene, &inputs).or_refuse()?;
     let (mut times, mut last) = (Times::default(), None);
     args.shot.make(session, &pipeline, &[], &frames, |report| {
         times.add(report);

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use frazil::scene::{Inputs, Scene, check_memory, snow};
 
 use super::ShotArgs;
-use crate::cli::session::{Failure, Phase, Session};
+use crate::cli::session::{Failure, OrFailure, Session};
 
 /// Press moving objects into a layer of snow.
 ///
@@ -33,20 +33,20 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let mut scene = Scene::read_with(&args.scene, &args.shot.set).before()?;
-    scene.snow().before()?;
+    let mut scene = Scene::read_with(&args.scene, &args.shot.set).or_refuse()?;
+    scene.snow().or_refuse()?;
     if let Some(factor) = args.preview {
-        scene.coarsen(factor.into()).before()?;
+        scene.coarsen(factor.into()).or_refuse()?;
     }
     let frames = args.shot.frames(&scene)?;
     session.ctx.set_memory_limit(session.max_memory());
-    let inputs = Inputs::load(&scene).before()?;
-    check_memory(&scene, &inputs, session.max_memory()).before()?;
+    let inputs = Inputs::load(&scene).or_refuse()?;
+    check_memory(&scene, &inputs, session.max_memory()).or_refuse()?;
     let pipeline = snow::pipeline(&scene, &inputs);
     let mut removed = 0.0;
     args.shot.make(session, &pipeline, &args.stage, &frames, |report| {
-        let of_frame = report.results.get("removed_m3").and_then(|value| value.as_f64());
-        removed += of_frame.unwrap_or(0.0);
+        let volume = report.results.get("removed_m3").and_then(|value| value.as_f64());
+        removed += volume.unwrap_or(0.0);
     })?;
     session.record("removed_m3", removed.into());
     Ok(())

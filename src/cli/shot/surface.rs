@@ -7,7 +7,7 @@ use frazil::scene::{Frames, Scene, surface};
 
 use super::ShotArgs;
 use crate::cli::options::positive;
-use crate::cli::session::{Failure, Phase, Session};
+use crate::cli::session::{Failure, OrFailure, Session};
 
 /// Carry a detailed mesh along with the particles of a liquid, frame by frame, keeping its detail.
 ///
@@ -41,15 +41,15 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let scene = args.scene().before()?;
+    let scene = args.scene().or_refuse()?;
     let frames = args.shot.frames(&scene)?;
     session.ctx.set_memory_limit(session.max_memory());
-    let inputs = surface::Inputs::load(&session.ctx, &scene).before()?;
-    let pipeline = surface::pipeline(&scene, &inputs).before()?;
+    let inputs = surface::Inputs::load(&session.ctx, &scene).or_refuse()?;
+    let pipeline = surface::pipeline(&scene, &inputs).or_refuse()?;
     let mut flagged = 0;
     args.shot.make(session, &pipeline, &[], &frames, |report| {
-        let of_frame = report.results.get("flagged").and_then(|value| value.as_u64());
-        flagged = flagged.max(of_frame.unwrap_or(0));
+        let count = report.results.get("flagged").and_then(|value| value.as_u64());
+        flagged = flagged.max(count.unwrap_or(0));
     })?;
     session.record("spacing_m", inputs.spacing.into());
     session.record("most_flagged", flagged.into());
@@ -62,7 +62,7 @@ impl Args {
             let path = self.scene.as_deref().unwrap_or(Path::new(""));
             return Scene::read_with(path, &self.shot.set);
         };
-        let frames = there(particles)?;
+        let frames = existing_frames(particles)?;
         let quoted = |path: &Path| toml::Value::String(path.to_string_lossy().into_owned()).to_string();
         let mut text = format!("[shot]\nframes = \"{frames}\"\n");
         text += &self.fps.map_or(String::new(), |fps| format!("fps = {fps:?}\n"));
@@ -74,13 +74,13 @@ impl Args {
 }
 
 /// The existing frames of a sequence, from the first to the last.
-fn there(particles: &Path) -> frazil::Result<Frames> {
+fn existing_frames(particles: &Path) -> frazil::Result<Frames> {
     let Some(pattern) = Pattern::parse(particles) else {
         frazil::io::files::source::open(particles)?;
         return Ok(Frames { first: 1, last: 1 });
     };
-    let there = pattern.frames()?;
-    match there[..] {
+    let frames = pattern.frames()?;
+    match frames[..] {
         [first, .., last] | [first @ last] => Ok(Frames { first, last }),
         [] => Err(frazil::Error::file(particles, "no frame of this sequence is there")),
     }

@@ -1,7 +1,7 @@
 //! `frazil vdb union`, `difference`, `intersection`.
 
 use super::VdbOutput;
-use crate::cli::session::{Failure, Phase, Session};
+use crate::cli::session::{Failure, OrFailure, Session};
 use frazil::vdb::{FloatGrid, file};
 use frazil::{Context, Result};
 use std::path::PathBuf;
@@ -30,8 +30,8 @@ pub fn run(
     operation: impl FnOnce(&Context, &mut FloatGrid, FloatGrid) -> Result<()> + Send,
 ) -> std::result::Result<(), Failure> {
     operands.output.check(&[&operands.a, &operands.b])?;
-    let mut a = file::read_level_set(&session.ctx, &operands.a, operands.grid_a.as_deref()).before()?;
-    let b = file::read_level_set(&session.ctx, &operands.b, operands.grid_b.as_deref()).before()?;
-    session.ctx.phase(phase, || operation(&session.ctx, &mut a, b)).during()?;
-    operands.output.write(session, a).during()
+    let mut a = file::read_level_set(&session.ctx, &operands.a, operands.grid_a.as_deref()).or_refuse()?;
+    let b = file::read_level_set(&session.ctx, &operands.b, operands.grid_b.as_deref()).or_refuse()?;
+    session.ctx.phase(phase, || operation(&session.ctx, &mut a, b)).or_fail()?;
+    operands.output.write(session, a).or_fail()
 }

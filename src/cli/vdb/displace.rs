@@ -1,7 +1,7 @@
 //! `frazil vdb displace`.
 
 use super::VdbOutput;
-use crate::cli::session::{Failure, Phase, Session};
+use crate::cli::session::{Failure, OrFailure, Session};
 use frazil::snow::NoiseParams;
 use frazil::snow::base_layer::displace;
 use frazil::vdb::file;
@@ -35,12 +35,12 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     args.output.check(&[&args.input])?;
-    let mut grid = file::read_level_set(&session.ctx, &args.input, args.grid.as_deref()).before()?;
+    let mut grid = file::read_level_set(&session.ctx, &args.input, args.grid.as_deref()).or_refuse()?;
     let defaults = NoiseParams::for_cell(grid.voxel_size());
     let amplitude = args.amplitude.unwrap_or(defaults.amplitude);
     let size = args.size.unwrap_or(defaults.size);
     let noise = NoiseParams { amplitude, size, octaves: args.octaves, seed: args.seed };
-    noise.validate(grid.voxel_size()).before()?;
-    displace(&session.ctx, &mut grid, &noise).during()?;
-    args.output.write(session, grid).during()
+    noise.validate(grid.voxel_size()).or_refuse()?;
+    displace(&session.ctx, &mut grid, &noise).or_fail()?;
+    args.output.write(session, grid).or_fail()
 }

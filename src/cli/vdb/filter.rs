@@ -2,7 +2,7 @@
 
 use super::VdbOutput;
 use crate::cli::options::finite;
-use crate::cli::session::{Failure, Phase, Session};
+use crate::cli::session::{Failure, OrFailure, Session};
 use clap::ValueEnum;
 use frazil::vdb::file;
 use frazil::vdb::level_set::{self, Scheme};
@@ -79,7 +79,7 @@ enum Filter {
 pub fn offset(args: &OffsetArgs, session: &Session) -> Result<(), Failure> {
     let source = &args.source;
     source.output.check(&[&source.input])?;
-    let mut grid = file::read_level_set(&session.ctx, &source.input, source.grid.as_deref()).before()?;
+    let mut grid = file::read_level_set(&session.ctx, &source.input, source.grid.as_deref()).or_refuse()?;
     let cells = args.by.abs() / grid.voxel_size();
     if cells > 1000.0 {
         return Err(Failure::refused(format!(
@@ -87,9 +87,10 @@ pub fn offset(args: &OffsetArgs, session: &Session) -> Result<(), Failure> {
             args.by
         )));
     }
-    let far = level_set::beyond_band(&grid, args.by);
-    let scheme = source.scheme.unwrap_or(if far { SchemeName::Weno5 } else { SchemeName::FirstOrder });
-    if far && scheme == SchemeName::FirstOrder {
+    let is_beyond_band = level_set::beyond_band(&grid, args.by);
+    let scheme =
+        source.scheme.unwrap_or(if is_beyond_band { SchemeName::Weno5 } else { SchemeName::FirstOrder });
+    if is_beyond_band && scheme == SchemeName::FirstOrder {
         return Err(Failure::refused(format!(
             "--scheme first-order would miss --by {} by a tenth of the way, for it leaves the band of distances ({} m): \
              take weno5",
@@ -98,24 +99,24 @@ pub fn offset(args: &OffsetArgs, session: &Session) -> Result<(), Failure> {
         )));
     }
     let work = || level_set::offset(&session.ctx, &mut grid, args.by as f32, scheme.into());
-    session.ctx.phase("offset", work).during()?;
+    session.ctx.phase("offset", work).or_fail()?;
     if grid.active_voxels() == 0 {
         log::warn!("{}: nothing is left at --by {}", source.input.display(), args.by);
     }
-    source.output.write(session, grid).during()
+    source.output.write(session, grid).or_fail()
 }
 
 /// Runs `smooth`.
 pub fn smooth(args: &SmoothArgs, session: &Session) -> Result<(), Failure> {
     let source = &args.source;
     source.output.check(&[&source.input])?;
-    let mut grid = file::read_level_set(&session.ctx, &source.input, source.grid.as_deref()).before()?;
+    let mut grid = file::read_level_set(&session.ctx, &source.input, source.grid.as_deref()).or_refuse()?;
     let (width, times, scheme) =
         (args.width, args.times, source.scheme.unwrap_or(SchemeName::FirstOrder).into());
     let work = || match args.filter {
         Filter::Mean => level_set::mean_filter(&session.ctx, &mut grid, width, times, scheme),
         Filter::Gaussian => level_set::gaussian_filter(&session.ctx, &mut grid, width, times, scheme),
     };
-    session.ctx.phase("smooth", work).during()?;
-    source.output.write(session, grid).during()
+    session.ctx.phase("smooth", work).or_fail()?;
+    source.output.write(session, grid).or_fail()
 }

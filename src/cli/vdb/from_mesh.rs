@@ -2,7 +2,7 @@
 
 use super::VdbOutput;
 use crate::cli::options::{MeshSpace, positive, warn_of_corners};
-use crate::cli::session::{Failure, Phase, Session};
+use crate::cli::session::{Failure, OrFailure, Session};
 use frazil::motion::{Keys, Rigid};
 use frazil::sweep::{self, Body, Settings};
 use std::path::PathBuf;
@@ -28,18 +28,18 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let settings = Settings { half_width: args.half_width as f32, ..Settings::new(args.cell) };
-    settings.validate().before()?;
+    settings.validate().or_refuse()?;
     args.output.check(&[&args.mesh])?;
-    let mesh = args.space.read(&args.mesh).before()?;
+    let mesh = args.space.read(&args.mesh).or_refuse()?;
     if let Some(what) = super::far_mesh(&args.mesh, &mesh, args.cell) {
         log::warn!("{what}");
     }
     warn_of_corners(&args.mesh, &mesh);
-    super::check_surface(session, mesh.area(), args.cell).before()?;
-    let still = Body::new(Box::new(Rigid::new(mesh, Keys::default())), 0.0).before()?;
-    if let Some(what) = still.warning() {
+    super::check_surface(session, mesh.area(), args.cell).or_refuse()?;
+    let body = Body::new(Box::new(Rigid::new(mesh, Keys::default())), 0.0).or_refuse()?;
+    if let Some(what) = body.warning() {
         log::warn!("{}: {what}", args.mesh.display());
     }
-    let grid = sweep::chain(&session.ctx, &[still], 0.0, 0.0, &settings).during()?;
-    args.output.write(session, grid).during()
+    let grid = sweep::chain(&session.ctx, &[body], 0.0, 0.0, &settings).or_fail()?;
+    args.output.write(session, grid).or_fail()
 }

@@ -41,7 +41,7 @@ pub fn grids(path: &Path, measure: bool, ctx: &Context) -> frazil::Result<Vec<Va
         }
         if grid.value_type.starts_with("Tree_ptdataidx32") {
             let points = points::read(path, Some(&grid.name))?;
-            entry.extend(crate::cli::points::described(&points));
+            entry.extend(crate::cli::points::description(&points));
             if let Some(since) = changes_since(path)? {
                 entry.insert("partial".into(), json!(partial(since)));
             }

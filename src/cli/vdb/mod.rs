@@ -11,7 +11,7 @@ mod sweep;
 mod to_mesh;
 
 use super::output;
-use super::session::{Failure, Phase, Session};
+use super::session::{Failure, OrFailure, Session};
 use clap::{Subcommand, ValueEnum};
 use frazil::geometry::TriMesh;
 use frazil::geometry::mesh::{BY_OPTION, too_far};
@@ -122,8 +122,8 @@ impl VdbOutput {
     /// Refuses, before any work, a name or a folder that cannot be written, or an output that is one of the inputs.
     fn check(&self, inputs: &[&Path]) -> std::result::Result<(), Failure> {
         check_name(&self.output, &["vdb"])?;
-        output::check_writable(&self.output).before()?;
-        output::refuse_input(&self.output, inputs.iter().copied()).before()
+        output::check_writable(&self.output).or_refuse()?;
+        output::refuse_input(&self.output, inputs.iter().copied()).or_refuse()
     }
 
     /// Writes the grid and records what it holds.

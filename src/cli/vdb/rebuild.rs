@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use super::{Packing, check_name};
-use crate::cli::options::{of_frame, refuse_one_file};
+use crate::cli::options::{frame_path, refuse_one_file};
 use crate::cli::output;
-use crate::cli::session::{Failure, Phase, Session};
+use crate::cli::session::{Failure, OrFailure, Session};
 use frazil::io::files::atomic;
 use frazil::scene::run::DoneFrames;
 use frazil::scene::{FrameChoice, Rebuild, RebuildGrains};
@@ -25,7 +25,7 @@ pub struct Args {
     folder: PathBuf,
     /// Stage whose frames are made
     #[arg(long, value_enum, default_value = "base")]
-    stage: Of,
+    stage: RebuildStage,
     /// Frames to rebuild
     #[arg(long, value_name = "N|A-B|A-BxN", allow_hyphen_values = true)]
     frame: FrameChoice,
@@ -38,7 +38,7 @@ pub struct Args {
 
 /// The stages that can be rebuilt.
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
-enum Of {
+enum RebuildStage {
     /// The layer of snow
     Base,
     /// Grains, as points
@@ -48,14 +48,14 @@ enum Of {
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     check_name(&args.output, &["vdb"])?;
-    output::check_writable(&args.output).before()?;
+    output::check_writable(&args.output).or_refuse()?;
     refuse_one_file(&args.output, &args.frame, "base.%04d.vdb")?;
-    if args.stage == Of::Grains && args.packing.half {
+    if args.stage == RebuildStage::Grains && args.packing.half {
         return Err(Failure::refused("--half is of no use with --stage grains: points keep 32 bits"));
     }
     match args.stage {
-        Of::Base => {
-            let mut cache = Rebuild::open(&args.folder).before()?;
+        RebuildStage::Base => {
+            let mut cache = Rebuild::open(&args.folder).or_refuse()?;
             args.check(cache.stored())?;
             args.write(|frame| {
                 let layer = cache.layer(&session.ctx, frame)?;
@@ -64,8 +64,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
                 file::to_bytes(&layer.list(), &WriteOptions { metadata, ..args.packing.options() })
             })?;
         }
-        Of::Grains => {
-            let mut cache = RebuildGrains::open(&args.folder).before()?;
+        RebuildStage::Grains => {
+            let mut cache = RebuildGrains::open(&args.folder).or_refuse()?;
             args.check(cache.stored())?;
             args.write(|frame| cache.bytes(&session.ctx, frame, &args.packing.options()))?;
         }
@@ -81,13 +81,13 @@ impl Args {
             return Err(Failure::of_file(&self.folder, format!("frame {missing} is not there")));
         }
         let folders = ["base", "removed", "grains", "state"].map(|name| self.folder.join(name));
-        let own: Vec<PathBuf> =
+        let own_folders: Vec<PathBuf> =
             folders.iter().filter_map(|folder| std::fs::canonicalize(folder).ok()).collect();
-        let there = match self.output.parent() {
+        let target = match self.output.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => std::fs::canonicalize(folder).ok(),
             _ => std::env::current_dir().ok(),
         };
-        if there.is_some_and(|there| own.contains(&there)) {
+        if target.is_some_and(|target| own_folders.contains(&target)) {
             return Err(Failure::of_file(&self.output, "would be written among the cache's own files"));
         }
         Ok(())
@@ -97,8 +97,8 @@ impl Args {
     fn write(&self, mut bytes: impl FnMut(i32) -> frazil::Result<Vec<u8>>) -> Result<(), Failure> {
         self.frame.iter().try_for_each(|frame| {
             let written =
-                bytes(frame).and_then(|bytes| atomic::write_bytes(&of_frame(&self.output, frame), &bytes));
-            written.during()
+                bytes(frame).and_then(|bytes| atomic::write_bytes(&frame_path(&self.output, frame), &bytes));
+            written.or_fail()
         })
     }
 }

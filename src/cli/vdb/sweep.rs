@@ -2,7 +2,7 @@
 
 use super::VdbOutput;
 use crate::cli::options::{MeshSpace, Origin, needs_frames, positive, triple};
-use crate::cli::session::{Failure, Phase, Session};
+use crate::cli::session::{Failure, OrFailure, Session};
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::io::files::sequence::Pattern;
 use frazil::motion::{Key, Keys, MeshSequence, Morph, Motion, Placed, Rigid};
@@ -70,14 +70,14 @@ enum Method {
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let settings = Settings { half_width: args.half_width as f32, ..Settings::new(args.cell) };
-    settings.validate().before()?;
+    settings.validate().or_refuse()?;
     if !(0.0..=100.0).contains(&args.dilate) {
         return Err(Failure::refused("--dilate must lie in 0 to 100 cells"));
     }
     let inputs: Vec<&Path> = args.mesh.iter().map(PathBuf::as_path).collect();
     args.output.check(&inputs)?;
     let grid = args.sweep(session, &settings)?;
-    args.output.write(session, grid).during()
+    args.output.write(session, grid).or_fail()
 }
 
 impl Args {
@@ -87,22 +87,22 @@ impl Args {
         let round = from.bounds().map_or(0.0, |(low, high)| 4.0 * (high - low).norm());
         // The surfaces of both poses, and the area that their outline sweeps in between.
         let area = from.area() + to.area() + f64::from(round * path);
-        super::check_surface(session, area, self.cell).before()
+        super::check_surface(session, area, self.cell).or_refuse()
     }
 
     fn sweep(&self, session: &Session, settings: &Settings) -> Result<FloatGrid, Failure> {
         let (motion, from, to) = self.motion()?;
-        let ends = [motion.mesh_at(from).before()?, motion.mesh_at(to).before()?];
+        let ends = [motion.mesh_at(from).or_refuse()?, motion.mesh_at(to).or_refuse()?];
         if let Some(what) = super::far_mesh(&self.mesh[0], &ends[0], self.cell) {
             log::warn!("{what}");
         }
         self.check_memory(session, [&ends[0], &ends[1]])?;
-        let bodies = [Body::new(motion, from).before()?];
+        let bodies = [Body::new(motion, from).or_refuse()?];
         for what in bodies[0].warning().into_iter().chain(bodies[0].weld_warning()) {
             log::warn!("{}: {what}", self.mesh[0].display());
         }
         match self.method {
-            Method::Chain => sweep::chain(&session.ctx, &bodies, from, to, settings).during(),
+            Method::Chain => sweep::chain(&session.ctx, &bodies, from, to, settings).or_fail(),
             Method::Samples => {
                 let settings = SamplesSettings {
                     half_width: settings.half_width,
@@ -111,7 +111,7 @@ impl Args {
                     smooth: self.smooth,
                     ..SamplesSettings::new(self.cell)
                 };
-                sweep::samples(&session.ctx, &bodies, from, to, &settings).during()
+                sweep::samples(&session.ctx, &bodies, from, to, &settings).or_fail()
             }
         }
     }
@@ -127,17 +127,17 @@ impl Args {
                 Some(pattern) => {
                     self.refuse_motion("a sequence", ["--move", "--turn-deg"])?;
                     let Frames { first, last } = self.frames.ok_or_else(|| needs_frames(path))?;
-                    let (seen, origin) = (Arc::default(), self.space.origin.at);
-                    let sequence = MeshSequence::open_seen(pattern, first, last, 1.0, 0.0, seen, origin);
-                    (Box::new(sequence.before()?) as Box<dyn Motion>, first.into(), last.into())
+                    let (hashes, origin) = (Arc::default(), self.space.origin.at);
+                    let sequence = MeshSequence::open_seen(pattern, first, last, 1.0, 0.0, hashes, origin);
+                    (Box::new(sequence.or_refuse()?) as Box<dyn Motion>, first.into(), last.into())
                 }
                 None => {
                     self.refuse_motion("one mesh", ["--frames"])?;
                     if self.by.is_none() && self.turn_deg.is_none() {
                         return Err(Failure::of_file(path, "one mesh needs --move or --turn-deg"));
                     }
-                    let still = Rigid::of_polygons(self.space.origin.read(path).before()?, Keys::default());
-                    (Box::new(still) as Box<dyn Motion>, 0.0, 1.0)
+                    let mesh = Rigid::of_polygons(self.space.origin.read(path).or_refuse()?, Keys::default());
+                    (Box::new(mesh) as Box<dyn Motion>, 0.0, 1.0)
                 }
             },
             [] => return Err(Failure::refused("a sweep needs a mesh")),
@@ -153,7 +153,7 @@ impl Args {
         let turn = self.turn_deg.unwrap_or_default().map(f64::to_radians);
         let start = Key { time: 0.0, at: DVec3::zeros(), turn: DVec3::zeros() };
         let end = Key { time: 1.0, at: self.by.unwrap_or_default(), turn };
-        Keys::new(vec![start, end]).before()
+        Keys::new(vec![start, end]).or_refuse()
     }
 
     fn refuse_motion<const N: usize>(&self, with: &str, refused: [&str; N]) -> Result<(), Failure> {
@@ -172,9 +172,9 @@ impl Args {
 /// One mesh that becomes another with the same faces.
 fn morph(origin: &Origin, from: &Path, to: &Path) -> Result<Box<dyn Motion>, Failure> {
     let [first, second] = [from, to].map(|path| origin.read(path));
-    let (first, second) = (first.before()?, second.before()?);
+    let (first, second) = (first.or_refuse()?, second.or_refuse()?);
     if !first.has_faces_of(&second) {
         return Err(Failure::of_file(to, format!("has other faces than {}", from.display())));
     }
-    Ok(Box::new(Morph::new(first.into_triangles(), second.positions).before()?))
+    Ok(Box::new(Morph::new(first.into_triangles(), second.positions).or_refuse()?))
 }

@@ -3,7 +3,7 @@
 use super::check_name;
 use crate::cli::options::finite;
 use crate::cli::output;
-use crate::cli::session::{Failure, Phase, Session};
+use crate::cli::session::{Failure, OrFailure, Session};
 use frazil::vdb::{file, level_set};
 use serde_json::json;
 use std::path::PathBuf;
@@ -34,17 +34,17 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return Err(Failure::refused("--adaptivity must lie in 0 to 1"));
     }
     check_name(&args.output, &["ply", "obj", "stl"])?;
-    output::check_writable(&args.output).before()?;
-    output::refuse_input(&args.output, [args.input.as_path()]).before()?;
-    let grid = file::read_level_set(&session.ctx, &args.input, args.grid.as_deref()).before()?;
+    output::check_writable(&args.output).or_refuse()?;
+    output::refuse_input(&args.output, [args.input.as_path()]).or_refuse()?;
+    let grid = file::read_level_set(&session.ctx, &args.input, args.grid.as_deref()).or_refuse()?;
     if args.iso.abs() >= f64::from(grid.background()) {
         let band = grid.background();
         return Err(Failure::refused(format!("--iso {} lies outside the band of {band} m", args.iso)));
     }
     let (iso, adaptivity) = (args.iso as f32, args.adaptivity as f32);
     let work = || level_set::to_mesh(&session.ctx, &grid, iso, adaptivity);
-    let mesh = session.ctx.phase("mesh", work).during()?;
-    frazil::io::mesh::write(&args.output, &mesh).during()?;
+    let mesh = session.ctx.phase("mesh", work).or_fail()?;
+    frazil::io::mesh::write(&args.output, &mesh).or_fail()?;
     session.record("vertices", json!(mesh.positions.len()));
     session.record("triangles", json!(mesh.triangles.len()));
     Ok(())

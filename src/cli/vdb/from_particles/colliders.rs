@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::cli::options::of_frame;
+use crate::cli::options::frame_path;
 use crate::cli::session::Session;
 use crate::cli::vdb::far_mesh;
 use frazil::geometry::TriMesh;
@@ -13,25 +13,25 @@ use frazil::vdb::level_set::{difference, to_mesh};
 use frazil::vdb::{FloatGrid, file};
 use frazil::{Context, Error, Result};
 
-/// Relative tolerance for two lengths to be taken as equal.
-const ROUNDING: f64 = 1e-6;
+/// Relative difference below which two lengths are equal.
+const TOLERANCE: f64 = 1e-6;
 
-/// Margin of voxels around a liquid in which a solid is resampled, too.
-const ROOM: i32 = 16;
+/// Margin (voxels) around a liquid in which a solid is resampled too.
+const MARGIN: i32 = 16;
 
 /// One file, or a file for each frame.
 struct Collider {
     path: PathBuf,
     is_sequence: bool,
-    /// The solids of a single file, until the first frame takes them.
-    first: Option<Vec<FloatGrid>>,
+    /// The level sets of a single file, until the first frame takes them.
+    shared: Option<Vec<FloatGrid>>,
     /// The solids of the previous frame, or of all frames.
     solids: Vec<Solid>,
 }
 
-/// A solid that a liquid may be cut by.
+/// A solid to cut out of a liquid.
 enum Solid {
-    /// On the liquid's cells, with a band of the same width.
+    /// A level set on the liquid's cells, with a band of the same width.
     Ready(FloatGrid),
     /// The surface, and the last level set made from it, with the box of voxels in which that is valid.
     Surface(TriMesh, Option<([[i32; 3]; 2], FloatGrid)>),
@@ -41,12 +41,12 @@ enum Solid {
 pub struct Colliders(Vec<Collider>);
 
 impl Colliders {
-    /// Reads the files that all frames share; files of single frames are read in their turn.
+    /// Reads the files that all frames share; files of single frames are read when their frame is made.
     pub fn open(ctx: &Context, paths: &[PathBuf]) -> Result<Self> {
         let open = |path: &PathBuf| {
             let is_sequence = Pattern::parse(path).is_some();
-            let first = if is_sequence { None } else { Some(read(ctx, path)?) };
-            Ok(Collider { path: path.clone(), is_sequence, first, solids: Vec::new() })
+            let shared = if is_sequence { None } else { Some(read(ctx, path)?) };
+            Ok(Collider { path: path.clone(), is_sequence, shared, solids: Vec::new() })
         };
         paths.iter().map(open).collect::<Result<_>>().map(Self)
     }
@@ -59,8 +59,8 @@ impl Colliders {
     /// Cuts the solids of a frame out of a liquid.
     pub fn cut(&mut self, session: &Session, liquid: &mut FloatGrid, frame: i32) -> Result<()> {
         self.0.iter_mut().try_for_each(|collider| {
-            let path = of_frame(&collider.path, frame);
-            collider.cut(&session.ctx, liquid, &path).map_err(|error| of_solid(&path, error))
+            let path = frame_path(&collider.path, frame);
+            collider.cut(&session.ctx, liquid, &path).map_err(|error| with_path(&path, error))
         })
     }
 }
@@ -70,7 +70,7 @@ impl Collider {
     fn cut(&mut self, ctx: &Context, liquid: &mut FloatGrid, path: &Path) -> Result<()> {
         let cell = liquid.voxel_size();
         if self.is_sequence || self.solids.is_empty() {
-            let grids = match self.first.take() {
+            let grids = match self.shared.take() {
                 Some(grids) => grids,
                 None => read(ctx, path)?,
             };
@@ -91,7 +91,7 @@ impl Solid {
     /// A solid for a liquid with cells of this edge (m).
     fn new(ctx: &Context, grid: FloatGrid, path: &Path, cell: f64) -> Result<Self> {
         let width = f64::from(HALF_WIDTH) * cell;
-        let is_same = |a: f64, b: f64| (a - b).abs() <= ROUNDING * b;
+        let is_same = |a: f64, b: f64| (a - b).abs() <= TOLERANCE * b;
         // Combining requires cells that agree to nine digits.
         let has_cells = grid.is_world_fixed() && (grid.voxel_size() - cell).abs() <= 1e-9 * cell;
         if has_cells && is_same(f64::from(grid.background()), width) {
@@ -110,24 +110,24 @@ impl Solid {
 
     /// Its level set in a box of a liquid's voxels, on cells of this edge (m).
     fn within(&mut self, ctx: &Context, [low, high]: [[i32; 3]; 2], cell: f64) -> Result<FloatGrid> {
-        let (mesh, made) = match self {
+        let (mesh, cache) = match self {
             Self::Ready(grid) => return grid.deep_copy(),
             Self::Surface(mesh, _) if mesh.triangles.is_empty() => {
                 return FloatGrid::level_set(cell, HALF_WIDTH);
             }
-            Self::Surface(mesh, made) => (mesh, made),
+            Self::Surface(mesh, cache) => (mesh, cache),
         };
         let holds = |bounds: &[[i32; 3]; 2]| {
             (0..3).all(|axis| bounds[0][axis] <= low[axis] && high[axis] <= bounds[1][axis])
         };
-        match made {
+        match cache {
             Some((bounds, grid)) if holds(bounds) => grid.deep_copy(),
             _ => {
                 // A liquid that moves a little stays within the margin.
-                let bounds = [low.map(|at| at - ROOM), high.map(|at| at + ROOM)];
+                let bounds = [low.map(|at| at - MARGIN), high.map(|at| at + MARGIN)];
                 let settings = Settings { half_width: HALF_WIDTH, ..Settings::new(cell) };
                 let grid = voxelise_within(ctx, mesh.clone(), &settings, bounds)?;
-                let (_, grid) = made.insert((bounds, grid));
+                let (_, grid) = cache.insert((bounds, grid));
                 grid.deep_copy()
             }
         }
@@ -135,7 +135,7 @@ impl Solid {
 }
 
 /// An error that arose while a solid was cut out, with the name of its file.
-fn of_solid(path: &Path, error: Error) -> Error {
+fn with_path(path: &Path, error: Error) -> Error {
     let path = path.display();
     match error {
         Error::Memory { needed, limit, .. } => {
@@ -147,7 +147,10 @@ fn of_solid(path: &Path, error: Error) -> Error {
     }
 }
 
-/// The names of the level sets of a file, ascending; those of another precision than ours are refused.
+/// The names of the level sets of a file, ascending.
+///
+/// # Errors
+/// A level set that is not of 32-bit floats.
 fn names(path: &Path) -> Result<Vec<String>> {
     let mut grids = file::describe(path)?;
     grids.retain(|grid| grid.class == "level set");
@@ -163,8 +166,11 @@ fn names(path: &Path) -> Result<Vec<String>> {
 /// All level sets of a file.
 fn read(ctx: &Context, path: &Path) -> Result<Vec<FloatGrid>> {
     let names = names(path)?;
-    if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-        return Err(Error::file(path, format!("has two level sets \"{}\": give them other names", twice[0])));
+    if let Some(duplicate) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Err(Error::file(
+            path,
+            format!("has two level sets \"{}\": give them other names", duplicate[0]),
+        ));
     }
     if names.len() < 2 {
         return Ok(vec![solid(ctx, path, None)?]);

@@ -8,11 +8,13 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::{Packing, check_name};
-use crate::cli::each::Each;
-use crate::cli::options::{MeshSpace, needs_frames, of_frame, one_frame, positive, refuse_one_file, triple};
+use crate::cli::frame_results::FrameResults;
+use crate::cli::options::{
+    MeshSpace, frame_path, needs_frames, one_frame, positive, refuse_one_file, triple,
+};
 use crate::cli::output;
 use crate::cli::points::points_of_vdb;
-use crate::cli::session::{Failure, Phase, Session};
+use crate::cli::session::{Failure, OrFailure, Session};
 use colliders::Colliders;
 use frazil::geometry::mesh::attributes::{Number, On};
 use frazil::geometry::points::{Attribute, Values};
@@ -25,7 +27,7 @@ use frazil::surface::{TOO_FAR, estimate_spacing, rough_spacing, specks, transfer
 use frazil::vdb::file;
 use frazil::vdb::level_set::to_mesh;
 use frazil::{Context, Error, Result, io};
-use shape::{Method, Recipe};
+use shape::{Method, SurfaceParams};
 
 /// Make the surface of a liquid from its particles: a level set, a mesh, or both
 ///
@@ -106,21 +108,22 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
         if !args.attributes.is_empty() && extensions.contains(&"ply") && extension(path) != "ply" {
             return Err(Failure::of_file(path, "only .ply files hold --attributes"));
         }
-        output::check_writable(path).before()?;
+        output::check_writable(path).or_refuse()?;
         refuse_one_file(path, &frames, "level.%04d.vdb")?;
         for frame in frames.iter() {
-            let inputs: Vec<PathBuf> = args.inputs().map(|input| of_frame(input, frame)).collect();
-            output::refuse_input(&of_frame(path, frame), inputs.iter().map(PathBuf::as_path)).before()?;
+            let inputs: Vec<PathBuf> = args.inputs().map(|input| frame_path(input, frame)).collect();
+            output::refuse_input(&frame_path(path, frame), inputs.iter().map(PathBuf::as_path))
+                .or_refuse()?;
         }
     }
-    let mut colliders = Colliders::open(&session.ctx, &args.subtract).before()?;
+    let mut colliders = Colliders::open(&session.ctx, &args.subtract).or_refuse()?;
     let spacing = match args.spacing {
         Some(spacing) => spacing,
-        None => args.estimated(session, &frames)?,
+        None => args.estimated_spacing(session, &frames)?,
     };
-    let (mut total, mut is_compared) = (Made::default(), args.spacing.is_none());
+    let (mut total, mut is_compared) = (Counts::default(), args.spacing.is_none());
     let make = |frame| args.frame(session, frame, spacing, &mut colliders, &mut is_compared);
-    let each = Each::run(session, &frames, make, |made| {
+    let results = FrameResults::run(session, &frames, make, |made| {
         total.particles += made.particles;
         total.specks += made.specks;
         total.triangles += made.triangles;
@@ -129,24 +132,24 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
     session.record("specks_left_out", json!(total.specks));
     session.record("spacing_m", json!(spacing));
     session.record("triangles", json!(total.triangles));
-    each.finish()
+    results.finish()
 }
 
-/// Report of what was made.
+/// Counts for the report.
 #[derive(Default)]
-struct Made {
+struct Counts {
     particles: usize,
     specks: usize,
     triangles: usize,
 }
 
-/// Ratio of a given spacing to the estimate, up or down, from which it looks like a mistake.
-const ODD: f64 = 2.0;
+/// A given spacing that differs from the estimate by more than this factor is probably a mistake.
+const MAX_RATIO: f64 = 2.0;
 
-/// Warns if a given spacing (m) does not match the particles: a wrong unit makes single drops, or one lump.
+/// Warns if a given spacing (m) does not match the particles, as with a wrong unit: the surface is then single drops, or one lump.
 fn warn_of_spacing(path: &Path, positions: &[DVec3], spacing: f64) {
-    let odd = |estimate: &f64| !(1.0 / ODD..=ODD).contains(&(spacing / estimate));
-    if let Some(estimate) = rough_spacing(positions).filter(odd) {
+    let is_mistaken = |estimate: &f64| !(1.0 / MAX_RATIO..=MAX_RATIO).contains(&(spacing / estimate));
+    if let Some(estimate) = rough_spacing(positions).filter(is_mistaken) {
         log::warn!(
             "{}: a spacing of {spacing} m is given, but particles lie {estimate:.6} m apart",
             path.display()
@@ -173,14 +176,18 @@ impl Args {
     }
 
     /// The spacing (m) of the particles, from the first frame that allows an estimate.
-    fn estimated(&self, session: &Session, frames: &FrameChoice) -> std::result::Result<f64, Failure> {
-        let mut first: Option<Error> = None;
+    fn estimated_spacing(
+        &self,
+        session: &Session,
+        frames: &FrameChoice,
+    ) -> std::result::Result<f64, Failure> {
+        let mut first_error: Option<Error> = None;
         for frame in frames.iter() {
-            session.ctx.check().during()?;
-            let path = of_frame(&self.particles, frame);
+            session.ctx.check().or_fail()?;
+            let path = frame_path(&self.particles, frame);
             match self.read(&path) {
-                Ok(cloud) => {
-                    if let Some(spacing) = estimate_spacing(&cloud.positions) {
+                Ok(data) => {
+                    if let Some(spacing) = estimate_spacing(&data.positions) {
                         log::warn!(
                             "{}: the spacing of the particles is estimated as {spacing:.6} m; --spacing sets it",
                             path.display()
@@ -188,14 +195,14 @@ impl Args {
                         return Ok(spacing);
                     }
                     let what = "has too few particles, or too many at one position, to tell their spacing: give --spacing";
-                    first.get_or_insert_with(|| Error::file(&path, what));
+                    first_error.get_or_insert_with(|| Error::file(&path, what));
                 }
                 Err(error) => {
-                    first.get_or_insert(error);
+                    first_error.get_or_insert(error);
                 }
             }
         }
-        Err(first.map_or_else(|| Failure::refused("there are no frames"), Failure::refused))
+        Err(first_error.map_or_else(|| Failure::refused("there are no frames"), Failure::refused))
     }
 
     /// Makes the files of a frame.
@@ -206,24 +213,24 @@ impl Args {
         spacing: f64,
         colliders: &mut Colliders,
         is_compared: &mut bool,
-    ) -> Result<Made> {
-        let path = of_frame(&self.particles, frame);
-        let mut cloud = self.read(&path)?;
-        if !cloud.positions.is_empty() && !std::mem::replace(is_compared, true) {
-            warn_of_spacing(&path, &cloud.positions, spacing);
+    ) -> Result<Counts> {
+        let path = frame_path(&self.particles, frame);
+        let mut data = self.read(&path)?;
+        if !data.positions.is_empty() && !std::mem::replace(is_compared, true) {
+            warn_of_spacing(&path, &data.positions, spacing);
         }
-        let specks = self.leave_out(&mut cloud, spacing, &path)?;
+        let specks = self.leave_out(&mut data, spacing, &path)?;
         // A file without particles may lack their attributes.
-        let columns = if cloud.positions.is_empty() { Vec::new() } else { self.columns(&cloud, &path)? };
-        let made = self.make(session, (&cloud.positions, &columns), spacing, (frame, colliders));
+        let columns = if data.positions.is_empty() { Vec::new() } else { self.columns(&data, &path)? };
+        let made = self.make(session, (&data.positions, &columns), spacing, (frame, colliders));
         let mesh = made.map_err(|error| match error {
             Error::Argument(what) if what.starts_with(TOO_FAR) => Error::file(&path, what),
             other => other,
         })?;
-        Ok(Made { particles: cloud.positions.len(), specks, triangles: mesh.triangles.len() })
+        Ok(Counts { particles: data.positions.len(), specks, triangles: mesh.triangles.len() })
     }
 
-    /// Handles options that leave nothing: an error for a single file, a warning for a frame of a sequence, which may well have no liquid there.
+    /// Handles options that leave no particles: an error for a single file, a warning for a frame of a sequence, which may have no liquid.
     fn refuse_nothing(&self, path: &Path, what: &str) -> Result<()> {
         if Pattern::parse(&self.particles).is_none() {
             return Err(Error::file(path, what));
@@ -234,53 +241,58 @@ impl Args {
 
     /// The particles of a file (m) that lie in the box; a warning if there are none.
     fn read(&self, path: &Path) -> Result<ParticleData> {
-        let mut cloud: ParticleData =
+        let mut data: ParticleData =
             if extension(path) == "vdb" { points_of_vdb(path)?.into() } else { particles::read(path)? };
-        if cloud.positions.is_empty() {
+        if data.positions.is_empty() {
             log::warn!("{}: holds no particles: its surface is empty", path.display());
-            return Ok(cloud);
+            return Ok(data);
         }
-        self.space.space().bring(&mut cloud);
+        self.space.space().bring(&mut data);
         if let (Some(low), Some(high)) = (self.box_min, self.box_max) {
             let is_inside = |p: &DVec3| (0..3).all(|axis| (low[axis]..=high[axis]).contains(&p[axis]));
-            let kept: Vec<bool> = cloud.positions.iter().map(is_inside).collect();
-            cloud.retain(&kept);
-            if cloud.positions.is_empty() {
+            let is_kept: Vec<bool> = data.positions.iter().map(is_inside).collect();
+            data.retain(&is_kept);
+            if data.positions.is_empty() {
                 self.refuse_nothing(path, "has no particles in the box")?;
             }
         }
-        Ok(cloud)
+        Ok(data)
     }
 
     /// Leaves small groups of particles out; returns the number of these particles.
-    fn leave_out(&self, cloud: &mut ParticleData, spacing: f64, path: &Path) -> Result<usize> {
-        let Some(least) = self.min_drop else { return Ok(0) };
-        let specks = specks(&cloud.positions, spacing, least as usize)?;
+    fn leave_out(&self, data: &mut ParticleData, spacing: f64, path: &Path) -> Result<usize> {
+        let Some(min_count) = self.min_drop else { return Ok(0) };
+        let specks = specks(&data.positions, spacing, min_count as usize)?;
         let count = specks.iter().filter(|is| **is).count();
-        if count > 0 && count == cloud.positions.len() {
-            self.refuse_nothing(path, &format!("has no group of {least} particles"))?;
+        if count > 0 && count == data.positions.len() {
+            self.refuse_nothing(path, &format!("has no group of {min_count} particles"))?;
         }
         if count > 0 {
-            log::info!("{}: {count} particles in groups of fewer than {least} are left out", path.display());
-            cloud.retain(&specks.iter().map(|is| !is).collect::<Vec<_>>());
+            log::info!(
+                "{}: {count} particles in groups of fewer than {min_count} are left out",
+                path.display()
+            );
+            data.retain(&specks.iter().map(|is| !is).collect::<Vec<_>>());
         }
         Ok(count)
     }
 
     /// The attributes for the mesh, with the names of its arrays.
-    fn columns(&self, cloud: &ParticleData, path: &Path) -> Result<Vec<(String, Vec<f32>)>> {
-        let count = cloud.positions.len();
+    fn columns(&self, data: &ParticleData, path: &Path) -> Result<Vec<(String, Vec<f32>)>> {
+        let count = data.positions.len();
         let wanted = |attribute: &&Attribute| {
             matches!(attribute.values, Values::Float(_) | Values::Vector(_))
                 && self.attributes.iter().any(|name| name == "all" || *name == attribute.name)
         };
-        let found: Vec<&Attribute> = cloud.attributes.iter().filter(wanted).collect();
+        let found: Vec<&Attribute> = data.attributes.iter().filter(wanted).collect();
         let is_missing =
             |name: &&String| *name != "all" && !found.iter().any(|attribute| attribute.name == **name);
         if let Some(missing) = self.attributes.iter().find(is_missing) {
-            let there: Vec<&str> = cloud.attributes.iter().map(|attribute| &attribute.name[..]).collect();
-            let what =
-                format!("has no attribute \"{missing}\" of floats or vectors; it has {}", there.join(", "));
+            let available: Vec<&str> = data.attributes.iter().map(|attribute| &attribute.name[..]).collect();
+            let what = format!(
+                "has no attribute \"{missing}\" of floats or vectors; it has {}",
+                available.join(", ")
+            );
             return Err(Error::file(path, what));
         }
         if let Some(attribute) = found.iter().find(|attribute| attribute.name.contains(char::is_whitespace)) {
@@ -315,14 +327,14 @@ impl Args {
     }
 
     /// The options that make a surface from particles of a spacing (m).
-    fn recipe(&self, spacing: f64) -> Recipe {
+    fn surface_params(&self, spacing: f64) -> SurfaceParams {
         let radius = self.radius.unwrap_or(spacing);
         let cell = match self.method {
             Method::Solenthaler => 0.5 * spacing,
             Method::Spheres => (radius / SPHERE_CELLS).min(0.5 * spacing),
         };
         let cell = self.cell.unwrap_or(cell);
-        Recipe { method: self.method, spacing, cell, radius, passes: self.smooth }
+        SurfaceParams { method: self.method, spacing, cell, radius, passes: self.smooth }
     }
 
     /// Makes the files of a frame.
@@ -334,9 +346,9 @@ impl Args {
         (frame, colliders): (i32, &mut Colliders),
     ) -> Result<TriMesh> {
         let ctx = &session.ctx;
-        let recipe = self.recipe(spacing);
+        let surface_params = self.surface_params(spacing);
         let wants_grid = self.output.is_some() || !colliders.is_empty();
-        let (mut mesh, mut grid) = recipe.surface(session, positions, wants_grid)?;
+        let (mut mesh, mut grid) = surface_params.surface(session, positions, wants_grid)?;
         if !colliders.is_empty()
             && let Some(liquid) = &mut grid
         {
@@ -344,25 +356,25 @@ impl Args {
             let cut = &*liquid;
             mesh = ctx.phase("mesh", || to_mesh(ctx, cut, 0.0, 0.0))?;
             if mesh.triangles.is_empty() && !positions.is_empty() {
-                let particles = of_frame(&self.particles, frame);
+                let particles = frame_path(&self.particles, frame);
                 log::warn!("{}: nothing is left of the liquid", particles.display());
             }
         }
         if let (Some(path), Some(grid)) = (&self.output, &mut grid) {
             grid.set_name(&self.name)?;
-            file::write(&of_frame(path, frame), &[&*grid], &self.packing.options())?;
+            file::write(&frame_path(path, frame), &[&*grid], &self.packing.options())?;
         }
         if let Some(path) = &self.mesh {
             let means = ctx.phase("attributes", || means(ctx, positions, spacing, &mesh, columns))?;
             let arrays: Vec<&MeshArray> = means.iter().collect();
             let carried = io::mesh::Carried { arrays: &arrays, ..Default::default() };
-            io::mesh::write_carried(&of_frame(path, frame), &mesh, &carried)?;
+            io::mesh::write_carried(&frame_path(path, frame), &mesh, &carried)?;
         }
         Ok(mesh)
     }
 }
 
-/// The attributes of the particles around, as arrays of a mesh's vertices.
+/// The mean attributes of the particles around each vertex, as arrays of a mesh.
 fn means(
     ctx: &Context,
     positions: &[DVec3],

@@ -24,7 +24,7 @@ pub enum Method {
 
 /// The parameters of a surface.
 #[derive(Clone, Copy)]
-pub struct Recipe {
+pub struct SurfaceParams {
     pub method: Method,
     /// Initial distance between particles (m).
     pub spacing: f64,
@@ -36,7 +36,7 @@ pub struct Recipe {
     pub passes: u32,
 }
 
-impl Recipe {
+impl SurfaceParams {
     /// The surface of particles at positions (m), with its level set if requested; both are empty without particles.
     pub fn surface(
         &self,

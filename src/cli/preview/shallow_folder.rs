@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::cli::preview::parts::{Folder, Part, Wet};
+use crate::cli::preview::parts::{Folder, LiquidLook, Part};
 use frazil::geometry::TriMesh;
 use frazil::io::mesh;
 use frazil::scene::Scene;
@@ -16,7 +16,7 @@ const LIQUID: &str = "liquid";
 const TERRAIN: &str = "terrain";
 
 /// An output folder of `frazil shallow`, read frame by frame.
-pub struct Spill {
+pub struct ShallowFolder {
     folder: PathBuf,
     liquid: DoneFrames,
     /// The scene; none if it cannot be read: the liquid is then drawn alone.
@@ -27,7 +27,7 @@ pub struct Spill {
     frames: Vec<i32>,
 }
 
-impl Spill {
+impl ShallowFolder {
     /// Opens a folder; none if it has no such frames.
     ///
     /// # Errors
@@ -51,7 +51,7 @@ impl Spill {
     }
 
     /// The terrain, and the objects on it; a warning if they cannot be read.
-    fn around(&mut self, ctx: &Context, frame: i32, look: Wet) -> Vec<Part> {
+    fn around(&mut self, ctx: &Context, frame: i32, look: LiquidLook) -> Vec<Part> {
         let Some(scene) = &self.scene else { return Vec::new() };
         let around = match self.terrain.clone() {
             Some(terrain) => Surroundings::with_terrain(terrain, scene, frame),
@@ -75,7 +75,7 @@ impl Spill {
     }
 }
 
-impl Folder for Spill {
+impl Folder for ShallowFolder {
     fn path(&self) -> &Path {
         &self.folder
     }
@@ -98,7 +98,7 @@ impl Folder for Spill {
 
     fn read(&mut self, ctx: &Context, frame: i32) -> Result<Vec<Part>> {
         let look = self.scene.as_ref().and_then(|scene| scene.shallow().ok());
-        let look = Wet::of(look.map_or("", |liquid| &*liquid.look));
+        let look = LiquidLook::of(look.map_or("", |liquid| &*liquid.look));
         let mut parts = self.around(ctx, frame, look);
         let is_stained = |(at, path): &(i32, String)| *at == frame && path.ends_with(".ply");
         if self.liquid.files(TERRAIN).iter().any(is_stained) {

@@ -12,7 +12,7 @@ use frazil::vdb::{FloatGrid, file};
 use frazil::{Context, Error, Result};
 
 /// A shot's folder, read frame by frame.
-pub struct Shot {
+pub struct ShotFolder {
     folder: PathBuf,
     base: Rebuild,
     grains: RebuildGrains,
@@ -36,7 +36,7 @@ const STAGES: [(&str, &[&str]); 5] = [
     ("surface", &["ply"]),
 ];
 
-impl Shot {
+impl ShotFolder {
     /// Opens a folder.
     ///
     /// # Errors
@@ -69,7 +69,7 @@ impl Shot {
     }
 }
 
-impl Folder for Shot {
+impl Folder for ShotFolder {
     fn path(&self) -> &Path {
         &self.folder
     }
@@ -143,9 +143,9 @@ fn files_of(folder: &Path, stored: &DoneFrames, (stage, extensions): (&str, &[&s
 
 /// The frames that all existing stages have.
 fn frames_of_all(files: &[Files]) -> Vec<i32> {
-    let mut of_stages = files.iter().filter(|files| !files.is_empty());
-    let Some(first) = of_stages.next() else { return Vec::new() };
-    let others: Vec<&Files> = of_stages.collect();
+    let mut stages = files.iter().filter(|files| !files.is_empty());
+    let Some(first) = stages.next() else { return Vec::new() };
+    let others: Vec<&Files> = stages.collect();
     let is_in_all = |frame: &&i32| others.iter().all(|files| files.contains_key(frame));
     first.keys().filter(is_in_all).copied().collect()
 }
