@@ -40,7 +40,7 @@ struct Pipe {
     /// Flux out of the fine column (fine units a step).
     flux: f32,
     /// Rounding remainder of the flux.
-    left: f32,
+    remainder: f32,
     /// Whole fine units that move in this step.
     transfer: f32,
 }
@@ -92,7 +92,7 @@ impl Seam {
         for pipe in &mut self.pipes {
             while old.next_if(|old| key(old) < key(pipe)).is_some() {}
             if let Some(same) = old.next_if(|old| key(old) == key(pipe)) {
-                (pipe.flux, pipe.left) = (same.flux, same.left);
+                (pipe.flux, pipe.remainder) = (same.flux, same.remainder);
             }
         }
         for end in 0..2 {
@@ -153,7 +153,7 @@ impl Seam {
                     direction,
                     open: openness(fine, coarse, [i, j], neighbours),
                     flux: 0.0,
-                    left: 0.0,
+                    remainder: 0.0,
                     transfer: 0.0,
                 });
             }
@@ -174,14 +174,14 @@ impl Seam {
 
     /// Flux and rounding remainder of each pipe, in order: the part of a saved state that describes the edge.
     pub fn numbers(&self) -> impl ExactSizeIterator<Item = [f32; 2]> + '_ {
-        self.pipes.iter().map(|pipe| [pipe.flux, pipe.left])
+        self.pipes.iter().map(|pipe| [pipe.flux, pipe.remainder])
     }
 
     /// Restores that part of a saved state.
     pub fn set_numbers(&mut self, last: f64, numbers: impl Iterator<Item = [f32; 2]>) {
         self.last = last;
-        for (pipe, [flux, left]) in self.pipes.iter_mut().zip(numbers) {
-            (pipe.flux, pipe.left) = (flux, left);
+        for (pipe, [flux, remainder]) in self.pipes.iter_mut().zip(numbers) {
+            (pipe.flux, pipe.remainder) = (flux, remainder);
         }
     }
 
@@ -227,7 +227,7 @@ impl Seam {
             let [i, j] = pipe.ends.map(|end| end as usize);
             let depth = [depths[i], coarse_depths[j]];
             if depth == [0; 2] {
-                (pipe.flux, pipe.left, pipe.transfer) = (0.0, 0.0, 0.0);
+                (pipe.flux, pipe.remainder, pipe.transfer) = (0.0, 0.0, 0.0);
                 continue;
             }
             let eta = coarse_bases[j] + depth[1];
@@ -246,7 +246,7 @@ impl Seam {
             let light = if K::VISCOUS && !K::WHOLE { fast_films::light(step, depth, pipe.flux) } else { 1.0 };
             let flux = flux_of::<K>(step, fall, depth, pipe.flux, pipe.open, light);
             pipe.flux = step.rest_if_slow::<K>(fall, depth, flux);
-            [pipe.transfer, pipe.left] = whole_and_remainder(pipe.flux, pipe.left);
+            [pipe.transfer, pipe.remainder] = whole_and_remainder(pipe.flux, pipe.remainder);
             if pipe.transfer != 0.0 {
                 any = true;
                 add(gives, takes, position, pipe.transfer);
