@@ -131,7 +131,7 @@ impl Heights {
 /// A box of cells: ranges of x and of z.
 pub type Cells = [Range<usize>; 2];
 
-/// Checks that a box lies within so many cells along x and along z.
+/// Checks that a box lies within nx x nz cells.
 pub(in crate::shallow) fn check_cells([x, z]: &Cells, [nx, nz]: [usize; 2]) -> Result<()> {
     if x.start > x.end || z.start > z.end || x.end > nx || z.end > nz {
         return Err(Error::argument(format!("cells {x:?} x {z:?} are not a box within {nx} x {nz} cells")));

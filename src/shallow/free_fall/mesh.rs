@@ -40,12 +40,12 @@ pub struct Target<'a> {
     pub indices: Indices<'a>,
 }
 
-/// Upper bounds of the counts of a mesh of so many drops.
+/// Upper bounds of the counts of a mesh of `drops` drops.
 pub fn bound(drops: usize) -> Counts {
     of(drops, drops)
 }
 
-/// Counts for so many drops and strands; the strands' vertices are extras.
+/// Counts for `drops` drops and `strands` strands; the strands' vertices are extras.
 fn of(drops: usize, strands: usize) -> Counts {
     let extras = RINGS * SIDES * strands;
     let triangles = BALL[1] * drops + 2 * (RINGS - 1) * SIDES * strands;
@@ -98,7 +98,7 @@ impl Default for Balls {
 }
 
 impl Balls {
-    /// Reserves capacity for so many drops: [`Balls::build`] then allocates nothing for as many.
+    /// Reserves capacity for `drops` drops, for which [`Balls::build`] then allocates nothing.
     pub fn reserve(&mut self, drops: usize) {
         self.order.clear();
         self.order.reserve(drops);
@@ -236,7 +236,7 @@ impl Balls {
         }
     }
 
-    /// Writes the triangles of the balls of so many drops, and of the strands.
+    /// Writes the triangles of the balls of `drops` drops, and of the strands.
     fn write_triangles<T>(&self, drops: usize, is_turned: bool, to: &mut [T], index: impl Fn(u32) -> T) {
         let corners = |[a, b, c]: [u32; 3]| if is_turned { [a, c, b] } else { [a, b, c] };
         let shape: [[u32; 3]; BALL[1]] = std::array::from_fn(|at| corners(self.triangles[at]));

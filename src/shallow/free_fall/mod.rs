@@ -3,7 +3,7 @@
 //! | word | meaning |
 //! |---|---|
 //! | overflow edge | a link that liquid falls freely from in a step: the void is beyond, or the surface there is lower by more than a given height (`solver/overflow_edges.rs`) |
-//! | rivulet | an overflow edge that takes what goes over those near it (`free_fall/rivulets.rs`) |
+//! | rivulet | an overflow edge that also takes the liquid of those near it (`free_fall/rivulets.rs`) |
 //! | packet | what went over an overflow edge in some steps; whole units of volume, which fly together (`flight.rs`) and land together (`falling.rs`, `splash.rs`) |
 //! | drop | a packet, as a host sees it |
 //! | strand | a tube between consecutive packets of an overflow edge, and from the edge to the newest (`mesh.rs`) |

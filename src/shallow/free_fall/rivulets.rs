@@ -1,7 +1,7 @@
 //! Rivulets: liquid from nearby overflow edges gathers into one fall, because of surface tension.
 //!
 //! A thin sheet that leaves an edge contracts: from the edge of a table a film runs off in rivulets some millimetres apart. Of all overflow
-//! edges, the one with the most liquid is the first rivulet, and takes what flows over those within [`REACH`]; of the remaining edges, the
+//! edges, the one with the most liquid is the first rivulet, and takes the liquid of those within [`REACH`]; of the remaining edges, the
 //! one with the most is the next. The recent flow of a rivulet counts, so that it stays where it is. All comparisons are in integers, and
 //! equal edges stay separate: a turned or mirrored scene has the same rivulets.
 
@@ -44,7 +44,7 @@ pub(super) struct Rivulets {
 }
 
 impl Rivulets {
-    /// Empty, with capacity for so many links.
+    /// Empty, with capacity for `links` links.
     pub fn with_room(links: usize) -> Self {
         Self { edges: Vec::with_capacity(links), order: Vec::with_capacity(links) }
     }

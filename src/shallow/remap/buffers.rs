@@ -29,7 +29,7 @@ pub struct Remap {
 }
 
 impl Remap {
-    /// With capacity for so many parcels of waiting liquid, besides those of a moving terrain.
+    /// With capacity for `parcels` parcels of waiting liquid, besides those of a moving terrain.
     pub fn new(parcels: usize) -> Self {
         let mut remap = Self::default();
         remap.held.reserve(parcels);

@@ -75,7 +75,7 @@ impl Default for Held {
 }
 
 impl Held {
-    /// Reserves capacity for so many more parcels.
+    /// Reserves capacity for `parcels` more parcels.
     pub(super) fn reserve(&mut self, parcels: usize) {
         self.parcels.reserve(256 + parcels);
         self.offers.reserve(1024 + 4 * parcels);

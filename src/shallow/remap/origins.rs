@@ -24,7 +24,7 @@ impl Default for Origins {
 }
 
 impl Origins {
-    /// Begins a band that will have so many strips.
+    /// Begins a band that will have `count` strips.
     pub fn begin(&mut self, band: &Band, count: usize) {
         self.first = band.first;
         self.counts = [band.strips.len(), count];

@@ -44,7 +44,7 @@ pub struct Overflow {
 }
 
 impl OverflowEdges {
-    /// With capacity for so many links.
+    /// With capacity for `links` links.
     pub(in crate::shallow) fn with_room(links: usize) -> Self {
         let (falls, depth) = (Vec::with_capacity(links), Vec::with_capacity(links));
         Self { falls, depth, flooded: Vec::with_capacity(links) }

@@ -74,7 +74,7 @@ impl RestSearch<'_> {
             && (north == NONE || self.north_pipes_rest(strip, north as usize))
     }
 
-    /// Whether the pipes to a strip from the one to the north rest.
+    /// Whether the pipes from the northern neighbour of a strip rest.
     fn north_pipes_rest(&self, strip: usize, north: usize) -> bool {
         let [_, south, _, remainder_south] = self.numbers.map(|numbers| strip_of(numbers, north));
         let from = north * STRIP;

@@ -40,7 +40,7 @@ pub struct Lines {
     pub(super) far: [[Vec<u32>; 2]; 2],
 }
 
-/// Numbers by column index, with padding before the first and behind the last. Each list has a different offset within a page
+/// Numbers by column index, with padding before the first and after the last. Each list has a different offset within a page
 /// (`columns/per_column.rs`).
 #[derive(Debug, Clone, Default)]
 pub(super) struct Numbers {

@@ -292,7 +292,7 @@ impl Pass<'_> {
         let (at, bases) = (strip * STRIP, columns.bases());
         let [total, first, second] = &self.surroundings[0];
         let own = self.contacts::<0>(strip);
-        // The columns to the east, and those of the rows before and behind. Pipes behind the last column are closed.
+        // The columns to the east, and those of the rows before and behind. Pipes beyond the last column are closed.
         let is_known = columns.east(strip).is_none_or(|east| self.has_surroundings[east]);
         let (mut far_total, mut far_first, mut far_second) = (ZEROS, ZEROS, ZEROS);
         let far = if is_known {
@@ -387,7 +387,7 @@ impl Pass<'_> {
         [rest.before(strip, 0), a.before(strip, 0), b.before(strip, 0)]
     }
 
-    /// Those of the pipes before (or behind) a strip's, at the distance of this pass; absent pipes have coefficients 0.
+    /// r, a and b of the pipes before (or behind) those of a strip, at the distance of this pass; 0 for absent pipes.
     #[inline(always)]
     fn far<const AXIS: usize>(&self, strip: usize, side: usize) -> [&[f32; STRIP]; 3] {
         let [rest, a, b] = &self.now[AXIS];
@@ -420,7 +420,7 @@ impl Pass<'_> {
     }
 }
 
-/// The numbers so many positions after those of a strip; 0 where there is none.
+/// The numbers `positions` after those of a strip; 0 where there is none.
 #[inline(always)]
 fn shifted<T: Copy + Default>(numbers: &[T], strip: usize, positions: isize) -> [T; STRIP] {
     let at = (strip * STRIP) as isize + positions;

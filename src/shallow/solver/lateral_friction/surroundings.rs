@@ -70,8 +70,8 @@ pub fn walls<const FULL: bool>(step: &Step, high: f32, inverse: f32, parts: [f32
     ((parts[0] + parts[1]) * one + parts[0] * parts[1] * more) * high * wall_weight(step, high)
 }
 
-/// Effective height (units) of a contact: its friction relative to that of a linear profile between pipes, likewise: (s / 2)^2 / sinh^2(s /
-/// 2), with the s of the contact's height.
+/// Effective height (units) of a contact: its height, times its friction relative to that of a linear profile between pipes. This is
+/// (s / 2)^2 / sinh^2(s / 2), with the s of the contact's height, approximated likewise.
 #[inline(always)]
 fn contact_height<const FULL: bool>(step: &Step, contact: f32) -> f32 {
     let reach = if FULL { REACH_FULL * REACH_FULL } else { REACH * REACH };
@@ -98,7 +98,7 @@ pub fn side<const FULL: bool, const ROOFED: bool>(
     let rise = (beyond.base - own.base) as f32;
     let surface_rise = (beyond.base + beyond.depth - (own.base + own.depth)) as f32;
     let (high, other) = (own.depth as f32, beyond.depth as f32);
-    // It is a slope as far as the surfaces differ in height like the bases.
+    // The part of the rise by which the surfaces differ, too, is a slope and not a wall.
     let bound = min(max(rise, -step.cell), step.cell);
     let lean = min(max(surface_rise, min(bound, 0.0)), max(bound, 0.0));
     let foot = rise - lean;
@@ -185,7 +185,7 @@ impl<'a> Around<'a> {
         if strip == NONE { [&ABSENT; 3] } else { self.strip(strip as usize) }
     }
 
-    /// The columns one position before those of a strip (`before` 1), or behind them (0).
+    /// The columns one position before those of a strip (`before` 1), or after them (0).
     #[inline(always)]
     fn shifted(&self, strip: usize, is_there: bool, before: usize) -> [[i32; STRIP]; 3] {
         let at = (strip * STRIP + 1).wrapping_sub(2 * before);

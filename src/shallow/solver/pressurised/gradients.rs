@@ -46,7 +46,7 @@ struct Link {
 }
 
 impl Gradients {
-    /// With capacity for so many nodes.
+    /// With capacity for `room` nodes.
     pub fn with_room(room: usize) -> Self {
         let numbers = || Vec::with_capacity(room + 1);
         Self {

@@ -70,7 +70,7 @@ pub struct State<'a> {
 }
 
 impl Network {
-    /// An empty network, for so many column indices and rows.
+    /// An empty network, for these counts of column indices and rows.
     pub fn new(columns: usize, rows: usize) -> Self {
         // A tool that dips in floods some hundred columns: frames must not allocate for them.
         let room = columns.min(ROOM);

@@ -1,5 +1,5 @@
 //! The arrays of a liquid, as seen by the threads that work on bands of its rows: each changes its own rows, and has copies of the rows
-//! before and behind, as they were at the start of the step.
+//! before and after, as they were at the start of the step.
 
 use std::ops::Range;
 
@@ -167,7 +167,7 @@ impl<'a> LinkPart<'a> {
 }
 
 impl<'a> BandView<'a> {
-    /// A band's rows, and copies of those before and behind.
+    /// A band's rows, and copies of those before and after.
     pub fn new(rows: Range<usize>, before: Part<'a>, own: Part<'a>, behind: Part<'a>) -> Self {
         Self { first: rows.start.saturating_sub(BEYOND), rows, parts: [before, own, behind] }
     }

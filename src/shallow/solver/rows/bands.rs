@@ -76,7 +76,7 @@ impl Bands {
             + 2 * self.may_fill.len()
     }
 
-    /// Divides the rows among so many threads by their columns, unless they are already.
+    /// Divides the rows into a band for each thread, with about equally many strips, unless they already are.
     pub fn divide(&mut self, columns: &Columns, threads: usize) {
         let rows = columns.grid.size[1];
         let wanted = if columns.len() < MIN_COLUMNS { 1 } else { threads.min(rows / MIN_ROWS).max(1) };
@@ -108,7 +108,7 @@ impl Bands {
         self.list = (0..wanted).map(band).collect();
     }
 
-    /// Makes buffers for liquid with so many scalars.
+    /// Makes buffers for liquid with `scalars` scalars.
     pub fn set_scalar_count(&mut self, columns: &Columns, scalars: usize) {
         let threads = self.list.len();
         self.scalars = scalars;
@@ -230,7 +230,7 @@ pub fn with_spinning_threads<R: Send>(threads: usize, work: impl FnOnce() -> R +
     rayon::join(work, || spin_until_done(threads.saturating_sub(1), ended)).0
 }
 
-/// Runs jobs of the pool, on so many threads, until the frame is done.
+/// Runs jobs of the pool on `threads` threads until the frame is done.
 fn spin_until_done(threads: usize, ended: &AtomicBool) {
     let wait = || {
         while !ended.load(Ordering::Acquire) {

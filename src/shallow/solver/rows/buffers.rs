@@ -47,7 +47,7 @@ pub struct RowBuffers {
 }
 
 impl RowBuffers {
-    /// Buffers for rows of these columns, for liquid with so many scalars.
+    /// Buffers for rows of these columns, for liquid with `scalars` scalars.
     pub fn new(columns: &Columns, scalars: usize) -> Self {
         let room = room(columns, 0..columns.grid.size[1]);
         let buffer = Buffer {

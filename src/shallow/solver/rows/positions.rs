@@ -4,12 +4,12 @@ use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::solver::active::Span;
 use crate::shallow::solver::transfers::scale::{Around, Beside};
 
-/// Padding before a row's buffer, for what lies west of it.
+/// Padding before a row's buffer, for reads to the west of its first column.
 pub const PAD: usize = STRIP;
 
 /// Positions of the columns of a row, and of the rows beside it, in their buffers.
 pub struct RowPositions {
-    /// First index of the row before, of the row itself, and of the row behind.
+    /// First index of the previous row, of the row itself and of the next row.
     starts: [usize; 3],
 }
 

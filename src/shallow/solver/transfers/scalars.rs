@@ -19,7 +19,7 @@ use crate::shallow::solver::rows::buffers::{RING, ScalarBuffers, ScalarRows};
 use crate::shallow::solver::rows::positions::RowPositions;
 
 impl ScalarBuffers {
-    /// For so many scalars, in rows of so many numbers.
+    /// Buffers for `count` scalars, in rows of `room` numbers.
     pub fn new(count: usize, room: usize) -> Self {
         let numbers = || vec![0.0; room];
         let rows = |_| ScalarRows {
@@ -36,7 +36,7 @@ impl ScalarBuffers {
         self.list.is_empty()
     }
 
-    /// Grows the buffers for rows of so many numbers.
+    /// Grows the buffers for rows of `room` numbers.
     pub fn widen(&mut self, room: usize) {
         for ScalarRows { level, south, east } in &mut self.list {
             level.iter_mut().chain(south).for_each(|numbers| numbers.resize(room, 0.0));
@@ -258,8 +258,8 @@ fn apply_law(effect: LawEffect, depth: &[i32], amount: &mut [f64]) -> i64 {
 }
 
 impl Network {
-    /// Moves the scalars of the network's units, at the concentrations before the transfer; `depth` is also the one before. `fallen`
-    /// receives what goes over overflow edges.
+    /// Moves the scalars of the network's units, at the concentrations before the transfer; `depth` is that before the transfer, too.
+    /// `fallen` receives what goes over overflow edges.
     pub fn move_scalars(
         &self,
         depth: &[i32],
