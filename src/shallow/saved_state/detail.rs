@@ -84,7 +84,7 @@ impl Detail {
     }
 
     /// Saves the state into a vector, with capacity for the largest state that this liquid can have.
-    pub(in crate::shallow) fn keep(&self, out: &mut Vec<u8>) {
+    pub(in crate::shallow) fn save_rollback(&self, out: &mut Vec<u8>) {
         let sizes = [&self.fine, &self.coarse].map(Shallow::max_save_size);
         let remainders = remainder_bytes(self.scalars().len()) * self.remainders.len();
         out.clear();

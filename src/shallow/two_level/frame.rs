@@ -43,13 +43,13 @@ impl Detail {
         if !may_take_long.contains(&true) {
             return self.steps(dt, &Stop::NEVER);
         }
-        let mut kept = std::mem::take(&mut self.kept);
-        self.keep(&mut kept);
+        let mut saved = std::mem::take(&mut self.rollback);
+        self.save_rollback(&mut saved);
         let result = self.steps(dt, &Stop::when(cancel));
         if result.is_err() {
-            self.put_back(&kept);
+            self.put_back(&saved);
         }
-        self.kept = kept;
+        self.rollback = saved;
         result
     }
 

@@ -56,7 +56,7 @@ impl Ground {
     }
 }
 
-/// The coarse cells of fine ones.
+/// The box of coarse cells that a box of fine ones makes up.
 pub(super) fn halved(cells: &Cells) -> Cells {
     cells.clone().map(|range| range.start / 2..range.end / 2)
 }

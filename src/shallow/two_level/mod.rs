@@ -55,7 +55,7 @@ pub struct Detail {
     pub(super) remainders: Remainders,
     points: Vec<FlowPoint>,
     /// The state before the frame, kept if the frame may take so long that it can be cancelled; a cancel restores it.
-    kept: Vec<u8>,
+    rollback: Vec<u8>,
 }
 
 impl Detail {
@@ -91,7 +91,7 @@ impl Detail {
             momentum: Momentum::default(),
             near,
             points: Vec::new(),
-            kept: Vec::new(),
+            rollback: Vec::new(),
         };
         detail.seam.find(&detail.fine, &detail.coarse, &detail.near);
         Ok(detail)

@@ -46,7 +46,7 @@ impl Contents {
 #[derive(Debug, Clone, Default)]
 pub(in crate::shallow) struct Remainders {
     units: Vec<i64>,
-    /// Empty where nothing is carried.
+    /// Empty without scalars.
     amounts: Vec<[i64; MAX_SCALARS]>,
 }
 

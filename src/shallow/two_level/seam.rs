@@ -165,7 +165,7 @@ impl Seam {
         self.find_pipe(column, axis, direction).map_or(0.0, |pipe| self.pipes[pipe].flux)
     }
 
-    /// Changes that flux, if there is a pipe.
+    /// Sets the flux that [`Seam::flux`] returns, if there is a pipe.
     pub fn set_flux(&mut self, column: usize, axis: usize, direction: i32, flux: f32) {
         if let Some(pipe) = self.find_pipe(column, axis, direction) {
             self.pipes[pipe].flux = flux;
@@ -177,7 +177,7 @@ impl Seam {
         self.pipes.iter().map(|pipe| [pipe.flux, pipe.remainder])
     }
 
-    /// Restores that part of a saved state.
+    /// Restores what [`Seam::numbers`] returned, and the length of the last step.
     pub fn set_numbers(&mut self, last: f64, numbers: impl Iterator<Item = [f32; 2]>) {
         self.last = last;
         for (pipe, [flux, remainder]) in self.pipes.iter_mut().zip(numbers) {

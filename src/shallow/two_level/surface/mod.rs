@@ -140,7 +140,7 @@ fn without_ledges<'a>(depths: &Depths<'a>) -> Depths<'a> {
     Depths { ledges: None, ..*depths }
 }
 
-/// A target without its first vertices, indices and columns.
+/// The part of a target after its first vertices, without `indices` and `columns`.
 fn skip_vertices<'t>(target: &'t mut Target<'_>, first: usize) -> Target<'t> {
     let Target { positions, normals, depths, opacities, velocities, carried, layers, .. } = target;
     Target {
