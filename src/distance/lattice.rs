@@ -15,8 +15,8 @@ const LIMIT: f64 = (1 << 29) as f64;
 /// Maximum coordinate, in cells from the lattice's origin voxel.
 pub const REACH: f64 = LIMIT / UNITS as f64;
 
-/// World-fixed voxel lattice (the centre of voxel (i, j, k) is at (i, j, k) x cell) with an origin voxel near the work region, so that
-/// coordinates are small.
+/// Voxel lattice that is fixed in the world (the centre of voxel (i, j, k) is at (i, j, k) x cell), with an origin voxel near the region of
+/// interest, so that coordinates are small.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lattice {
     /// Cell size (m).

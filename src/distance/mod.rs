@@ -14,7 +14,7 @@ pub mod winding;
 
 use lattice::Fixed;
 
-/// An oriented triangle of a surface; the volume lies behind it, `coef` times.
+/// An oriented triangle of a surface: the winding number is larger by `coef` behind it than in front of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Face {
     /// Corners, counter-clockwise seen from outside.

@@ -28,9 +28,9 @@ pub struct Group<'a> {
     pub squared: [f32; LANES],
     /// Index of the nearest triangle of each.
     pub nearest: [u32; LANES],
-    /// All triangles within `complete` cells of one of the voxels, and some that are farther away.
+    /// All triangles within `complete` of one of the voxels, and some that are farther away.
     pub near: &'a [u32],
-    /// See `near`.
+    /// Distance (cells) up to which `near` is complete.
     pub complete: f32,
     /// Offsets of the eight 4^3 sub-blocks' centres from all triangles, and which of them contains the voxels.
     far: (&'a [Offsets], usize),

@@ -10,9 +10,9 @@ pub struct Columns {
     /// Minimum and maximum column.
     low: [i32; 2],
     high: [i32; 2],
-    /// The index of each column between them, or [`NONE`].
+    /// For each column from `low` to `high`, its index in `positions`, or [`NONE`].
     indices: Vec<u32>,
-    /// The column of each index.
+    /// The added columns.
     positions: Vec<[i32; 2]>,
 }
 

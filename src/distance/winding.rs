@@ -105,8 +105,8 @@ impl Axis {
         self as usize
     }
 
-    /// A position in right-handed coordinates whose third axis runs along the lines (downward for y), and in which the symbolic shift of
-    /// the first two is positive, with the first one larger.
+    /// Rotates a position into right-handed coordinates whose third axis runs along the lines (downward for y), and in which the symbolic
+    /// shift of the first two is positive, with the first one larger.
     pub fn rotated(self, [x, y, z]: Fixed) -> [i64; 3] {
         let [x, y, z] = [x, y, z].map(i64::from);
         match self {

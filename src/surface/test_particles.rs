@@ -11,8 +11,8 @@ pub fn context(threads: usize) -> Context {
 
 /// Positions of a lattice between two distances (m) from its centre; with `from` = 0 they are a ball.
 pub fn shell(centre: DVec3, from: f64, to: f64) -> Vec<DVec3> {
-    let most = to.ceil() as i32;
-    let on = || (-most..=most).map(f64::from);
+    let reach = to.ceil() as i32;
+    let on = || (-reach..=reach).map(f64::from);
     let all = on().flat_map(|x| on().flat_map(move |y| on().map(move |z| DVec3::new(x, y, z))));
     all.filter(|position| (from..=to).contains(&position.norm())).map(|position| position + centre).collect()
 }
@@ -22,9 +22,9 @@ pub fn numbered(positions: Vec<DVec3>) -> Particles {
     Particles { ids: (0..positions.len() as i64).collect(), velocities: Vec::new(), positions }
 }
 
-/// Two balls, whose centres lie at `apart` and at `-apart` (m).
-pub fn two_balls(radius: f64, apart: DVec3) -> Particles {
-    numbered([shell(apart, 0.0, radius), shell(-apart, 0.0, radius)].concat())
+/// Two balls, whose centres lie at `centre` and at `-centre` (m).
+pub fn two_balls(radius: f64, centre: DVec3) -> Particles {
+    numbered([shell(centre, 0.0, radius), shell(-centre, 0.0, radius)].concat())
 }
 
 /// The surface of the particles themselves, in cells of half a spacing.

@@ -36,7 +36,7 @@ const TRIES: [f64; 2] = [5.0, REACH[1]];
 
 /// The reach covers the distance of this fraction of the vertices, so that a spike does not widen the band everywhere.
 const REACHED: f64 = 0.999;
-/// If the fraction `REACHED` would need a reach above `WIDE` (r), the reach is what the fraction `REACHED_IF_WIDE` needs, but at least `WIDE`; around the
+/// If `REACHED` would need a reach above `WIDE` (r), the reach covers only the fraction `REACHED_IF_WIDE`, but is at least `WIDE`; around the
 /// remaining vertices the band is widened locally.
 const WIDE: f64 = 2.5;
 const REACHED_IF_WIDE: f64 = 0.95;

@@ -22,7 +22,7 @@
 //! | facet | a triangle of the volume's surface: an open part of a face, or part of a patch; *sure* if known to be open throughout |
 //! | line, crossing | a line through voxels parallel to an axis; a point where it passes through a face |
 //! | meeting, spot | a crossing at which the line enters or leaves the volume; a meeting together with its line |
-//! | exposed | of a face: outermost at a meeting |
+//! | exposed | of a face: the outermost one at a meeting |
 //! | bin | the unit cube around a voxel, with the faces that may pass through it; a block with few faces is a single bin |
 //! | sheet, bundle, stack | adjoining faces; nearly coincident sheets; so many of them that the surface consists only of patches |
 //! | patch | a piece of the plane of an exposed face, around a spot |

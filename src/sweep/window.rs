@@ -1,9 +1,9 @@
-//! Where a sweep is wanted.
+//! The box in which a sweep is wanted.
 
 use crate::distance::lattice::Fixed;
 
-/// Fixed-point box in which a sweep is wanted. Faces are made wherever a line along z (the axis of the scan lines) through it may meet
-/// them: which voxels are inside depends on everything that a line meets, above and below the box too.
+/// Fixed-point box in which a sweep is wanted. Faces above and below it are made too: they lie on scan lines (along z) through the box, and
+/// decide which of its voxels are inside.
 #[derive(Debug, Clone, Copy)]
 pub struct Window {
     /// Minimum corner.

@@ -161,7 +161,7 @@ impl Around<'_> {
         f64::from(SIDE) * self.cell
     }
 
-    /// The box of a patch's nodes, grown by a margin (m), in units of a length (m) on each axis.
+    /// The minimum and maximum cell, of an edge `unit` (m), within a margin (m) of a patch's nodes.
     fn extent(&self, patch: Coord, margin: f64, unit: f64) -> [Coord; 2] {
         let low = patch.map(|at| f64::from(at) * self.edge());
         let high = low.map(|at| at + self.edge() - self.cell + margin);

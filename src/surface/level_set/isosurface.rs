@@ -9,8 +9,8 @@ use crate::geometry::{Coord, DVec3, TriMesh};
 
 /// Sentinel: no vertex.
 const NONE: u8 = u8::MAX;
-/// Values along a line are smooth if their second differences are at most the smaller share of the first, and a kink from the larger share
-/// on; between the two shares both cases are blended, or the surface would flicker.
+/// Ratios of the second differences to the first one along a line. Up to the smaller ratio the values count as smooth, and a cubic
+/// interpolates them; from the larger one on as a kink, and a line does. In between both are blended, so that the surface does not flicker.
 const SMOOTH: [f32; 2] = [0.3, 0.5];
 /// Iterations to the zero of a cubic; each leaves less than half of the error.
 const STEPS: usize = 6;
@@ -20,9 +20,9 @@ const STEPS: usize = 6;
 pub struct Isosurface {
     /// For each evaluated patch, its first vertex; then the count of all.
     first: Vec<u32>,
-    /// Positions of vertices, in cells from the first node of the patch that has them.
+    /// Positions of vertices, in cells from the first node of their patch.
     positions: Vec<[f32; 3]>,
-    /// The evaluated patch that has each vertex.
+    /// The evaluated patch of each vertex.
     owners: Vec<u32>,
     /// The patch of each run of triangles, and the end of the run.
     runs: Vec<(Coord, u32)>,
@@ -127,7 +127,7 @@ fn crossings(phi: &Implicit, patch: usize) -> Crossings {
                 to => next.map(|next| next[node + (to - 4) * step - at * step]),
             };
             let here = values[node];
-            // The surface does not cross to a patch that was not evaluated.
+            // The surface has no crossing between an evaluated patch and one that is not.
             let Some(there) = value(1) else { continue };
             if (here < 0.0) == (there < 0.0) {
                 continue;

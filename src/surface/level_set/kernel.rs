@@ -107,7 +107,7 @@ fn spread(sums: &Sums, lane: usize, radius: f64) -> Spread {
     Spread { weight, covariance: square / weight - mean * mean.transpose() }
 }
 
-/// The factor f for a rate at which the mean moves.
+/// The factor f, given the derivative of the mean.
 fn damping(rate: &Matrix3<f64>) -> f64 {
     let [low, high] = RATES;
     // This norm bounds all eigenvalues.

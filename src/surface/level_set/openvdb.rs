@@ -1,5 +1,4 @@
-//! Level sets of OpenVDB: of signed distances, and of the union of spheres around particles, the classic surface before smooth ones and the
-//! fastest preview of a liquid.
+//! Level sets of OpenVDB: of signed distances, and of the union of spheres around particles, which is the fastest preview of a liquid.
 
 use rayon::prelude::*;
 
@@ -80,8 +79,8 @@ pub fn spheres(ctx: &Context, positions: &[DVec3], radius: f64, cell: f64) -> Re
     Ok(grid)
 }
 
-/// Upper bound on the count of blocks within `reach` (cells) of positions (m): counts cubes of whole blocks at least that long, and those
-/// beside them.
+/// Upper bound on the count of blocks within `reach` (cells) of positions (m): the blocks in cubes at least that long that contain positions,
+/// and in the cubes around these.
 fn max_blocks(positions: &[DVec3], reach: f64, cell: f64) -> u64 {
     let blocks = (reach / DIM as f64).ceil();
     let edge = blocks * DIM as f64 * cell;

@@ -106,7 +106,7 @@ impl Parts {
         squares.into_iter().map(f64::sqrt).collect()
     }
 
-    /// Moves the parts that are not done.
+    /// Takes over the moved positions of the parts that are not done.
     fn take(&self, positions: &mut [DVec3], moved: &[DVec3], is_done: &[bool]) {
         for ((position, moved), &part) in positions.iter_mut().zip(moved).zip(&self.of) {
             if !is_done[part as usize] {

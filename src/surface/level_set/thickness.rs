@@ -55,7 +55,8 @@ impl Spread {
             across += (1.0 - is_along) * square;
             along += is_along * square;
         }
-        // As blunt at the rim as it is thin: with squares of both it would be an ellipse, whose middle wanders where particles are few.
+        // The thinner the sheet, the blunter its rim. With squares of both components the cross-section would be an ellipse, whose centre
+        // moves about where particles are few.
         (half, half * (across + libm::pow(along, spacing / half)).sqrt())
     }
 
@@ -72,7 +73,7 @@ impl Spread {
     fn thickness(&self, mean: Vector3<f64>, spacing: f64, a: f64, b: f64) -> f64 {
         let square = (SUPPORT * spacing).powi(2);
         let q = 1.0 - mean.norm_squared() / square;
-        // At least that of one particle's cube.
+        // At least the variance of one particle's cube.
         let min_variance = spacing * spacing / 12.0;
         let filled = (a.max(min_variance) * b.max(min_variance)).sqrt() / (square * q / 8.0);
         let area = std::f64::consts::PI * square * q.powi(3) / 3.0;

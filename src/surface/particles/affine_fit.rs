@@ -1,14 +1,14 @@
-//! Displacements of particles around a position: their weighted sums, and the affine map that fits them best.
+//! Weighted least-squares fit of an affine map to the displacements of the particles around a position.
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::{LANES, Lanes};
 
-/// Spread of the positions, over that on all axes, below which the map is constant in that direction.
+/// Fraction of the total variance of positions: in directions with less variance the map is constant.
 const FLAT: f64 = 0.004;
 
-/// Particles from a common corner (spacings): their positions and displacements, padded to whole lanes.
+/// Positions of particles from a common corner, and their displacements (spacings), padded to whole lanes.
 #[derive(Default)]
 pub struct Near {
     position: [Vec<[f32; LANES]>; 3],
@@ -49,7 +49,7 @@ pub struct Sums {
 }
 
 /// Sums over the particles within a radius (spacings) of a position, with the weights (1 - (d / radius)^2)^3 (poly6: Müller, Charypar and
-/// Gross 2003); none if there are no particles.
+/// Gross 2003); none if there are no particles. `in_radius` is scratch: it receives these particles, relative to the position.
 pub fn sums(near: &Near, in_radius: &mut Near, at: [f32; 3], radius: f32) -> Option<Sums> {
     dispatch!(sums_body(near: &Near, in_radius: &mut Near, at: [f32; 3], radius: f32) -> Option<Sums>)
 }
@@ -152,7 +152,7 @@ impl Sums {
         let (d, u) = (self.d / self.weight, self.u / self.weight);
         let spread = self.dd / self.weight - d * d.transpose();
         let joint = self.ud / self.weight - u * d.transpose();
-        // It is u + joint spread^-1 (x - d). In directions in which positions hardly spread it is constant.
+        // The map is u + joint spread^-1 (x - d). The damped inverse makes it constant in directions with little spread.
         let min_spread = FLAT * spread.trace();
         let damped = spread * spread + Matrix3::from_diagonal_element(min_spread * min_spread);
         let gradient = damped.try_inverse().map_or_else(Matrix3::zeros, |inverse| joint * spread * inverse);

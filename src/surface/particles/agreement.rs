@@ -12,17 +12,18 @@ use crate::surface::report::StepReport;
 
 /// Particles that are sampled.
 const SAMPLES: usize = 2000;
-/// Neighbouring particles whose median relative displacement in a frame is over this (spacings) are not the same ones: in a splashing dam
-/// break it is 0.2.
+/// If the median relative displacement of neighbouring particles in a frame is over this (spacings), ids do not identify them: in a splashing
+/// dam break it is 0.2.
 const TOO_FAR_APART: f64 = 1.0;
 /// Distance (spacings) up to which particles are neighbours.
 const BESIDE: f64 = 1.5;
-/// Share of particles without another where their velocities take them, from which on velocities are wrong.
+/// Velocities are wrong if over this fraction of particles finds no other particle where its velocity takes it.
 const MISSED: f64 = 0.5;
-/// Share from which on another factor is tried, and by how many times that must reduce it.
+/// If over the first fraction misses, factors on the velocities are tried; the best one is reported if it makes the fraction smaller by more
+/// than the second number, a factor.
 const SOME_MISSED: [f64; 2] = [0.05, 4.0];
-/// Factors between units: feet, ten, inches, centimetres and millimetres. The first of those that miss as few is taken: particles with too
-/// small velocities stay within the liquid too.
+/// Factors between units: feet, ten, inches, centimetres and millimetres. Of equally good factors the first is taken: very small velocities
+/// leave all particles within the liquid, and miss nothing.
 const FACTORS: [f64; 10] =
     [0.3048, 1.0 / 0.3048, 0.1, 10.0, 0.0254, 1.0 / 0.0254, 0.01, 100.0, 0.001, 1000.0];
 

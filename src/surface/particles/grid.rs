@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::error::{Error, Result};
 use crate::geometry::{Coord, DVec3};
 
-/// Messages about particles too far apart begin with this.
+/// Beginning of the message about particles too far apart, by which callers recognise it.
 pub const TOO_FAR: &str = "particles reach";
 /// Bits of each axis in a key.
 const BITS: u32 = 21;
@@ -18,7 +18,7 @@ const FARTHEST: i64 = 1 << BITS;
 pub struct Cells {
     /// Edge of a cell (m).
     edge: f64,
-    /// Minimum coordinates.
+    /// Minimum coordinates of the cells that hold particles.
     low: Coord,
     /// Keys of the cells that hold particles, ascending: x in the highest bits, then y, then z.
     keys: Vec<u64>,
@@ -148,8 +148,8 @@ impl Cells {
         }
     }
 
-    /// Calls `see` with the particles in the cells from `low` to `high`: their numbers in the order of cells, and their offsets from a cell
-    /// `from` (edges).
+    /// Calls `see` with the particles in the cells from `low` to `high`: their indices in the order of cells, and their offsets from the
+    /// minimum corner of the cell `from` (edges).
     pub fn near(&self, low: Coord, high: Coord, from: Coord, mut see: impl FnMut(usize, [f32; 3])) {
         self.between(low, high, |cell, at| {
             let shift = [0, 1, 2].map(|axis| (at[axis] - from[axis]) as f32);
@@ -159,8 +159,8 @@ impl Cells {
         });
     }
 
-    /// Calls `see` with each octant, a cube of half an edge, of the cells from `low` to `high` that hold particles, and its count of
-    /// particles: octants are numbered through all cells.
+    /// Calls `see` with the coordinates (half edges) of each octant of the cells from `low` to `high` that hold particles, and with its count
+    /// of particles.
     pub fn counts(&self, low: Coord, high: Coord, mut see: impl FnMut([i32; 3], u16)) {
         self.between(low, high, |cell, at| {
             for (octant, count) in self.octants[cell].iter().enumerate() {

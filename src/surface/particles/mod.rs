@@ -1,4 +1,4 @@
-//! The particles: where they are, how they move, and what they carry.
+//! The particles: neighbour search, paths, fits to displacements, attributes.
 
 pub(in crate::surface) mod affine_fit;
 pub(in crate::surface) mod agreement;

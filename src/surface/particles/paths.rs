@@ -1,7 +1,7 @@
 //! The path of each particle from one frame to the next.
 //!
-//! Particles are matched by id: files order them differently in each frame. With velocities a path is a cubic that begins and ends with
-//! these (Hermite), otherwise a line. Without ids the displacement is the velocity times the time.
+//! Particles are matched by id, since files order them differently in each frame. With velocities a path is a cubic Hermite curve, otherwise
+//! a line. Without ids the displacement is the velocity times the time.
 
 use std::collections::HashMap;
 
@@ -22,13 +22,13 @@ pub struct Paths {
     ranks: Vec<i64>,
     /// How velocities disagree with positions, if they do: they are then ignored.
     pub mismatch: Option<VelocityMismatch>,
-    /// Count of particles of the first frame that end, and of the second that are new.
+    /// Count of particles that exist only in the first frame, and of those that exist only in the second.
     pub died: usize,
     /// See `died`.
     pub born: usize,
 }
 
-/// Paths are cubics if the velocities predict the end points with a median error of at most this share of the median displacement.
+/// Velocities are used if they predict the end points with a median error of at most this fraction of the median displacement.
 const TRUSTED: f64 = 0.5;
 
 impl Paths {
@@ -99,7 +99,7 @@ impl Paths {
         Ok(Self { from: from.positions.clone(), to, ranks, ..Self::default() })
     }
 
-    /// The mismatch if velocities are not in the unit, or not of the time, of the positions.
+    /// The mismatch between velocities and positions, as with another unit or frame rate; none if velocities can be trusted.
     fn find_mismatch(&self) -> Option<VelocityMismatch> {
         let mean_tangent = |n: usize| (self.tangents[n][0] + self.tangents[n][1]) * 0.5;
         let displacement = |n: usize| self.to[n] - self.from[n];
@@ -141,7 +141,7 @@ impl Paths {
         .reduce(|| 0.0, f64::max)
     }
 
-    /// Positions (m) at a share 0..=1 of the time.
+    /// Positions (m) at a fraction 0..=1 of the time.
     pub fn at(&self, share: f64, out: &mut Vec<DVec3>) {
         let position = |n: usize| {
             let (from, to) = (self.from[n], self.to[n]);
@@ -161,7 +161,7 @@ impl Paths {
 }
 
 /// The particles between two frames of a cache that are `dt` (s) apart, at a fraction 0..1 of the time: those that exist in both, and those
-/// of the first that end.
+/// that exist only in the first, which continue with their velocities.
 ///
 /// # Errors
 /// Neither ids in both frames nor velocities in the first.

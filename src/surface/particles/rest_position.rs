@@ -14,21 +14,21 @@ use crate::surface::pieces::in_pieces;
 use crate::surface::topology::change::Change;
 use crate::surface::tracked_mesh::Tracker;
 
-/// Radius within which particles count (spacings): that of advection's maps. It is doubled, at most this often, where there are none.
+/// Radius within which particles count (spacings): that of advection's maps. Where there are none, it is doubled up to `DOUBLINGS` times.
 const RADIUS: i32 = 3;
 const DOUBLINGS: u32 = 1;
 /// Cells along a radius.
 const RINGS: i32 = 2;
-/// Particles have one origin if their first positions lie within this many radii, 4 spacings, of that of one of them. Those around a
-/// position on the surface lie little more than a radius from the nearest one, so that liquid that has kept its shape has a single origin.
-/// Bodies that have met were at least as far apart as the gap between them was wide; where that was less than 4 spacings, positions between
-/// the two origins are off by less than the gap. Where the liquid was compressed by more, only the nearest particles count.
+/// Particles have the same origin if their first positions lie within this many radii (4 spacings) of that of their representative. The
+/// particles around a position on the surface lie little more than a radius from the nearest one, so that liquid that has kept its shape has
+/// a single origin. Two bodies that were more than 4 spacings apart have two; if the gap was narrower, results between them are off by less
+/// than the gap. Where the liquid was compressed by more, only the nearest particles count.
 const TOGETHER: f64 = 4.0 / 3.0;
 /// Positions per task.
 const PIECE: usize = 256;
 /// Particles per task.
 const GRAIN: usize = 4096;
-/// Farthest cell.
+/// Maximum coordinate of a cell.
 const LIMIT: f64 = (i32::MAX / 4) as f64;
 
 /// The position of each particle at the first frame.
@@ -53,11 +53,10 @@ impl Rest {
         Some(Self { ids, positions })
     }
 
-    /// Where the liquid at positions (m) was at the first frame (m): from the particles around them, which are `now` and whose spacing is
-    /// `spacing` (m). Their displacements back are fitted by an affine map, like those of advection; of particles that came from different
-    /// positions only those of one origin count, the one with the largest total weight. None if no particle that existed at the first frame
-    /// is within three spacings (six, if no other one is either), or particles have no ids. The results for different positions are
-    /// independent.
+    /// Where the liquid at positions (m) was at the first frame (m), from the particles `now` around them, whose spacing is `spacing` (m).
+    /// Their displacements back to the first frame are fitted by an affine map, like those of advection; of particles with different origins
+    /// only those of the origin with the largest total weight count. None if no particle that existed at the first frame is within three
+    /// spacings (six, if no other one is either), or particles have no ids. The results for different positions are independent.
     ///
     /// # Errors
     /// A spacing that is not over 0; particles too far apart; cancel.
@@ -84,8 +83,8 @@ impl Rest {
         })
     }
 
-    /// The same for the vertices of a mesh after a change, at the time of the particles `now`, as far as
-    /// [`Traced`](crate::mesh_repair::Traced) needs it: for those of new triangles. None for all others.
+    /// The same for the vertices of new triangles after a change, at the time of the particles `now`, as
+    /// [`Traced`](crate::mesh_repair::Traced) needs it. None for all other vertices.
     ///
     /// # Errors
     /// As [`Rest::positions`].
@@ -129,7 +128,7 @@ impl Tracker {
 struct Neighbour {
     /// From the corner of the position's cell (cells).
     offset: [f32; 3],
-    /// Where it is, and was at the first frame (m).
+    /// Its position now and at the first frame (m).
     now: DVec3,
     first: DVec3,
     weight: f64,
@@ -207,8 +206,8 @@ impl Field {
         is_any
     }
 
-    /// The first position that the particles gathered within a radius (spacings) give for a position (m), which lies at `from` relative to
-    /// the corner of its cell (cells).
+    /// The position at the first frame (m), fitted to the particles gathered within a radius (spacings), of a position (m), which lies at
+    /// `from` relative to the corner of its cell (cells).
     fn fitted(&self, position: DVec3, from: DVec3, radius: i32, scratch: &mut Scratch) -> Option<DVec3> {
         let Scratch { neighbours, near, in_radius } = scratch;
         let max_distance = TOGETHER * f64::from(radius) * self.spacing;
@@ -234,8 +233,8 @@ impl Field {
     }
 }
 
-/// Groups particles by origin: those within `max_distance` (m) of the heaviest one that is left form a group. Returns the representative of the
-/// group with the largest total weight; none without particles.
+/// Groups particles by origin: those whose first positions lie within `max_distance` (m) of that of the heaviest particle left form a group,
+/// represented by it. Returns the representative of the group with the largest total weight; none without particles.
 fn heaviest_origin(neighbours: &mut [Neighbour], max_distance: f64) -> Option<usize> {
     let mut left: f64 = neighbours.iter().map(|one| one.weight).sum();
     let mut best: Option<(f64, usize)> = None;

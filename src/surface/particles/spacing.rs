@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::geometry::DVec3;
 
-/// Count of particles whose neighbours are used, and the count that suffices for a rough estimate.
+/// Count of particles whose neighbours are searched: for an estimate, and for a rough one.
 const SAMPLES: [usize; 2] = [256, 32];
 /// In a cubic grid this many particles are one spacing away. In a liquid they are nearer and farther, at the same mean distance (1.02
 /// spacings in frames of two solvers' caches).
@@ -22,7 +22,7 @@ pub fn rough(positions: &[DVec3]) -> Option<f64> {
 }
 
 fn median(positions: &[DVec3], samples: usize) -> Option<f64> {
-    // The same particles are used in whatever order they come.
+    // Sorted, so that the sampled particles do not depend on the input order.
     let mut order: Vec<usize> = (0..positions.len()).collect();
     let key = |at: &usize| positions[*at];
     order.par_sort_unstable_by(|a, b| {

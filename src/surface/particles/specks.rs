@@ -1,4 +1,4 @@
-//! Groups of a few particles apart from all others: spray too small for a surface.
+//! Small isolated groups of particles: spray that gets no surface.
 
 use super::grid::Cells;
 use crate::error::Result;
@@ -6,8 +6,8 @@ use crate::geometry::DVec3;
 use crate::geometry::check::topology::Sets;
 use crate::geometry::coords::around;
 
-/// Which particles at positions (m), whose spacing is `spacing` (m), belong to groups of fewer than `min_count`. Two particles are in the same
-/// group if the cells of one spacing that hold them touch.
+/// Whether each particle, at positions (m) whose spacing is `spacing` (m), belongs to a group of fewer than `min_count`. Two particles are in
+/// the same group if they lie in the same cell of one spacing, or in cells that touch.
 ///
 /// # Errors
 /// Particles too far apart.

@@ -9,14 +9,14 @@ use crate::geometry::DVec3;
 
 /// Radius within which particles count (spacings); it is doubled where there are none.
 const RADIUS: f64 = 2.0;
-/// How often it is doubled.
+/// Maximum number of doublings.
 const DOUBLINGS: u32 = 4;
 /// Vertices of a task.
 const PIECE: usize = 256;
 
-/// Means of numbers of the particles at positions (m), whose spacing is `spacing` (m), at vertices (m): a particle at a distance d
-/// has the weight (1 - (d / R)^2)^3. Each column has one number for each particle; each result has one for each vertex, 0 where no particle
-/// is near.
+/// Weighted means, at vertices (m), of the values of particles at positions (m) whose spacing is `spacing` (m): a particle at a distance d
+/// has the weight (1 - (d / R)^2)^3. Each column has one value for each particle; each result has one for each vertex, 0 where no particle is
+/// near.
 ///
 /// # Errors
 /// Particles too far apart; cancel.

@@ -1,4 +1,4 @@
-//! Whether an edge should be flipped.
+//! Which edges should be flipped.
 
 use super::improvable::TOO_LONG;
 use super::shape::{is_upright, min_angle};

@@ -9,8 +9,8 @@ pub struct Improvable<'a> {
     pub positions: &'a mut Vec<DVec3>,
     /// Triangles, counter-clockwise seen from outside.
     pub triangles: &'a mut Vec<[u32; 3]>,
-    /// For each vertex, the lengths of the shortest and of the longest edge around it at its birth: at birth no edge is out of range. Edges
-    /// between vertices of size 0 are never out of range.
+    /// For each vertex, the lengths of the shortest and of the longest edge around it at its birth, so that no edge is out of range then.
+    /// Edges between vertices of size 0 are never out of range.
     pub sizes: &'a mut Vec<Size>,
     /// For each vertex, its vertex before the frame; none: it was created in this frame.
     pub origins: &'a mut Vec<Option<u32>>,
@@ -18,7 +18,7 @@ pub struct Improvable<'a> {
     pub drifts: &'a mut Vec<[f32; 3]>,
     /// For each triangle, where it comes from.
     pub sources: &'a mut Vec<Source>,
-    /// For each vertex, whether its triangles are left alone: what is broken is rebuilt in the next frame.
+    /// For each vertex, whether its triangles are left alone: they are rebuilt in the next frame.
     pub flags: &'a mut Vec<bool>,
     /// Change of lengths where the liquid only jitters.
     pub jitter: f64,
@@ -45,7 +45,7 @@ impl Improvable<'_> {
         if stretch.is_finite() { stretch } else { 1.0 }
     }
 
-    /// Whether an edge is out of range, and not at rest.
+    /// Whether an edge is out of range, by `is_out`, and not at rest.
     pub fn needs_change(&self, ends: [u32; 2], is_out: fn(f64) -> bool) -> bool {
         is_out(self.stretch(ends)) && self.is_strained(ends)
     }

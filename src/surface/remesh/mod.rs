@@ -10,7 +10,8 @@
 //! |---|---|
 //! | size | of a vertex: the lengths of the shortest and of the longest edge around it at its birth |
 //! | target | of an edge: its range of lengths; too long refers to the lower of its ends' longest, too short to the higher of their shortest |
-//! | due | of a triangle: something about it may be out of range |
+//! | due | of a triangle: it may need an improvement |
+//! | near | triangles that a pass looks at |
 
 mod butterfly;
 mod collapse;
@@ -111,7 +112,7 @@ type Pass<T> = fn(&mut T, &[u32]) -> Result<()>;
 struct Work<'c, 'm, 'a> {
     ctx: &'c Context,
     rings: VertexRings<'m, 'a>,
-    /// How often edges may still be halved.
+    /// Rounds of splits that are left.
     rounds: usize,
     done: Improvements,
 }
@@ -127,7 +128,7 @@ impl Work<'_, '_, '_> {
         Ok(())
     }
 
-    /// Runs each pass on some triangles, and on those that change meanwhile; returns the changed ones.
+    /// Runs each pass on some triangles, and on those that earlier passes changed; returns all that changed.
     fn sweep(&mut self, mut near: Vec<u32>) -> Result<Vec<u32>> {
         let mut changed = Vec::new();
         let mut halved = self.split(&near)?;

@@ -11,8 +11,8 @@ const STRAIN: f64 = 0.04;
 /// Displacement since the reference up to which a vertex is at rest ([`Improvable::jitter`]): 0.3 spacings. On a sheet half a spacing
 /// thick, where fits extrapolate far beyond the particles, a jitter of 0.02 spacings displaces vertices by up to 0.26.
 const STILL: f64 = 30.0;
-/// In a creeping liquid, an edge that changes more slowly is checked too each time it crosses one of a series of limits: the first is this
-/// many times out of range, each following one this many times farther.
+/// In a creeping liquid, edges change more slowly than [`STRAIN`]. So an edge is also strained each time it crosses one of a series of
+/// limits: the first is the bound of the range times the first factor, each further one the one before times the second factor.
 const BEYOND: [f64; 2] = [4.0 / 3.0, 1.5];
 /// Factor on these limits for an edge whose ends are at rest. Moving edges are split or collapsed when they reach a limit, so that edges
 /// come to rest slightly within it and jitter across it, but not as far as this one.

@@ -39,7 +39,7 @@ pub(super) struct VertexRings<'m, 'a> {
 }
 
 impl<'m, 'a> VertexRings<'m, 'a> {
-    /// Takes two passes over all triangles.
+    /// Prepares a mesh, in two passes over all triangles.
     pub fn of(mesh: &'m mut Improvable<'a>) -> Self {
         let (vertices, triangles) = (mesh.positions.len(), mesh.triangles.len());
         Self {
@@ -157,7 +157,7 @@ impl<'m, 'a> VertexRings<'m, 'a> {
         self.fans.are_neighbours(self.mesh.triangles, a, b)
     }
 
-    /// Triangles with a corner that a collapse moves or renames, including those that it removes.
+    /// Triangles with a corner that a collapse moves or replaces, including those that it removes.
     pub fn moving(&self, collapse: &Collapse) -> Vec<u32> {
         let &Collapse { from, to, position, .. } = collapse;
         self.fans.moving(self.mesh.triangles, [from, to], position != self.position(to)).collect()

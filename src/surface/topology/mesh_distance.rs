@@ -27,7 +27,7 @@ const REACH: i32 = 8;
 const BYTES: usize = VOXELS * (2 * 4 + 2 * 28);
 /// What needs the memory, for messages.
 const WHAT: &str = "the mesh's change (larger cells need less)";
-/// Minimum distance of a node from the mesh (cells), so that it is inside or outside.
+/// Minimum magnitude of Gamma (cells), so that its sign shows whether a node is inside.
 const MIN_MAGNITUDE: f32 = 1e-6;
 /// All nodes of a block.
 const ALL: [u64; DIM] = [u64::MAX; DIM];

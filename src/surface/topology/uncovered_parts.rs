@@ -106,8 +106,7 @@ impl Parts {
     }
 
     /// Those of `drops` (ascending) that contain too few particles, and those of `bubbles` (each with a position (m) on it) that lie in such
-    /// a drop; also the bounds (cells) of these drops. `Change::drop_dry` counts in the same way: a mesh made for
-    /// a drop is not removed again.
+    /// a drop; also the bounds (cells) of these drops. `Change::drop_dry` counts in the same way, so that no new mesh is removed at once.
     fn specks(
         &self,
         phi: &Implicit,

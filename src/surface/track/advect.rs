@@ -1,11 +1,11 @@
-//! The mesh is carried along by the particles around it (thesis 2.2).
+//! Advection of the mesh by the particles around it (thesis 2.2).
 //!
 //! The thesis moves a vertex by the weighted mean of the particles' displacements. That is accurate to zeroth order only: a vertex outside
 //! the particles moves as those inside do, and lags where the liquid rotates. By default, affine maps are fitted to the displacements
 //! (weighted least squares) at the nodes of a grid, one spacing apart, and a vertex follows the eight maps around it: affine motion is
 //! exact, and there are far fewer nodes than vertices of a detailed mesh.
 //!
-//! If particles move farther than their spacing, a frame is divided, and the parts of their paths are followed one after the other.
+//! If particles move farther than their spacing in a frame, their paths are divided into parts, which are followed one after the other.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -22,7 +22,7 @@ use crate::surface::particles::paths::Paths;
 
 /// Radius within which particles count for a mean (spacings; thesis 2.2).
 const MEAN_RADIUS: f32 = 2.0;
-/// Radius within which they count for a map (spacings): the more particles, the less their jitter moves vertices.
+/// Radius within which particles count for a map (spacings): the more there are, the less their jitter moves vertices.
 const MAP_RADIUS: f32 = 3.0;
 /// Maximum displacement in one part of a frame (spacings).
 const STEP: f64 = 1.0;
@@ -30,7 +30,7 @@ const STEP: f64 = 1.0;
 const MAX_PARTS: usize = 64;
 /// How often the radius is doubled where no particle is near.
 const DOUBLINGS: u32 = 8;
-/// Farthest cell.
+/// Maximum coordinate of a cell.
 const LIMIT: f64 = (i32::MAX / 4) as f64;
 
 /// Where particles carry positions (m) from one frame to the next, `dt` (s, over 0) later: as

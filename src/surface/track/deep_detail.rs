@@ -33,7 +33,7 @@ impl Tracker {
         let mut boxes: BTreeMap<[Coord; 2], f64> = BTreeMap::new();
         for (position, delta) in vertices.iter().zip(&self.delta) {
             let far = f64::from(delta.abs()) / spacing;
-            // Maximum displacement of a vertex on the path to its foot.
+            // Maximum length of the path of a vertex to its foot (r).
             let [reach, path] =
                 if delta.is_nan() { [unknown; 2] } else { [self.reach_for(far), far + 2.0 * DRIFT] };
             if reach > self.reach {

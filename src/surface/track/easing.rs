@@ -19,19 +19,19 @@ const GRAIN: usize = 256;
 const PULLS: usize = 16;
 /// Maximum displacement to what replaces a vertex (spacings): anything farther away is another surface that appears.
 const MAX_DISPLACEMENT: f64 = 4.0;
-/// A part of the old surface is not eased if nothing new on it is farther away than this (spacings): there is no jump to hide.
+/// A part of the old surface is not eased if no new position near it is farther away than this (spacings): there is no jump to hide.
 const NEAR: f64 = 0.25;
 /// Number of iterations in which vertices without a pull take the mean displacement of their neighbours.
 const SPREAD: usize = 8;
 /// Pulls on a vertex are ignored if their weights add up to less than this.
 const MIN_WEIGHT: f64 = 1e-3;
 
-/// Effect of a step on the vertices before it.
+/// Where the vertices that a step removes should move before it.
 #[derive(Debug, Clone, Default)]
 pub struct EasingTargets {
     /// Vertices that are removed, ascending, with their displacements (m) to what replaces them.
     displacements: Vec<(u32, DVec3)>,
-    /// For each vertex, its vertex before the step, if any vertex is new or was removed.
+    /// The vertex that each vertex was before the step.
     origins: Origins,
 }
 
@@ -45,7 +45,7 @@ impl EasingTargets {
         Ok(Self { displacements, origins: Some(change.origins.clone()) })
     }
 
-    /// For a mesh that is exchanged for an unrelated one.
+    /// For a mesh that is replaced by an unrelated one of this many vertices: nothing is eased.
     pub fn unrelated(vertices: usize) -> Self {
         Self { displacements: Vec::new(), origins: Some(vec![None; vertices]) }
     }
@@ -55,7 +55,7 @@ impl EasingTargets {
         origin(&self.origins, vertex)
     }
 
-    /// Whether a vertex before the step is removed and something replaces it.
+    /// Whether a vertex before the step is removed, and moves towards its replacement.
     pub fn is_replaced(&self, vertex: u32) -> bool {
         self.displacements.binary_search_by_key(&vertex, |(vertex, _)| *vertex).is_ok()
     }
@@ -73,7 +73,7 @@ impl EasingTargets {
     }
 }
 
-/// The vertex that each vertex was; none: all are unchanged.
+/// For each vertex, the vertex that it was before, or none if it is new; none: all are unchanged.
 type Origins = Option<Vec<Option<u32>>>;
 
 fn origin(origins: &Origins, vertex: u32) -> Option<u32> {
@@ -114,7 +114,7 @@ pub fn eased<'a>(coming: impl IntoIterator<Item = &'a EasingTargets>, ahead: usi
     moved
 }
 
-/// Fraction of the displacement `steps` before the change is done; it starts and ends smoothly.
+/// Fraction of the displacement, `steps` steps before the change is done: a smoothstep.
 fn weight(steps: usize, ahead: usize) -> f64 {
     let gone = 1.0 - (steps as f64 / (ahead + 1) as f64).min(1.0);
     gone * gone * (3.0 - 2.0 * gone)
@@ -221,9 +221,9 @@ impl Patch {
         Self { is_loose: indices.iter().map(|index| is_loose(*index)).collect(), indices, triangles }
     }
 
-    /// The new positions at parts of the patch where the surface jumps: each belongs to the nearest part (whose vertices lie at `begin`),
-    /// and a part jumps if one of its positions is farther away than `near`. Positions beyond `longest` belong to another surface, and are
-    /// left out.
+    /// The new positions (`made`) at parts of the patch where the surface jumps: each belongs to the nearest part (whose vertices lie at
+    /// `begin`), and a part jumps if one of its positions is farther away than `near`. Positions farther than `longest` from all parts belong
+    /// to another surface, and are left out.
     fn positions_at_jumps(&self, begin: &[DVec3], made: Vec<DVec3>, [near, longest]: [f64; 2]) -> Vec<DVec3> {
         let mut part_of = vec![0; self.triangles.len()];
         let parts = bodies(&self.triangles);
@@ -244,7 +244,7 @@ impl Patch {
         found.into_iter().filter(|(_, part)| is_jump[*part]).map(|(position, _)| position).collect()
     }
 
-    /// Gives each removed or new vertex without a displacement the mean of those around it, several times; vertices that stay have none.
+    /// Gives removed vertices that were not pulled the mean displacement of their neighbours, several times; vertices that stay have none.
     fn spread(&self, displacements: &mut [DVec3], is_pulled: &[bool]) {
         for _ in 0..SPREAD {
             let sums =

@@ -10,15 +10,15 @@ use crate::geometry::coords::{between, cell_of};
 use crate::geometry::mesh::compact;
 use crate::geometry::{Coord, DVec3, TriMesh};
 
-/// Rounds in which the displacements of intersecting triangles are halved, and the total number of rounds; in the rounds after the halvings
-/// they are set to 0, and after the last round all are.
+/// Rounds in which the displacements of intersecting triangles are halved, and the total number of rounds. In the rounds after the halvings
+/// these displacements are set to 0, and after the last round all are.
 const HALVINGS: usize = 5;
 const ROUNDS: usize = 20;
 /// Maximum difference of the shares of neighbours after a round: no vertex is left sticking out alone.
 const STEP: f64 = 0.25;
 /// Maximum number of bins for the box of a triangle; a larger box is near everything.
 const BINS: i64 = 4096;
-/// For a vertex that is not displaced.
+/// Sentinel: the vertex is not displaced.
 const NONE: u32 = u32::MAX;
 
 /// A vertex, and its displacement (m).
@@ -107,7 +107,7 @@ impl<'a> ReachedRegion<'a> {
         meeting_pairs(&TriMesh { positions, triangles: self.triangles.clone() })
     }
 
-    /// The displacements at triangles that intersect with these shares, but not without displacements; ascending.
+    /// Indices of the displacements at triangles that intersect with these shares, but not without displacements; ascending.
     fn crossed(&self, own: &[[u32; 2]], shares: &[f64]) -> Vec<u32> {
         let new = self.intersecting_pairs(shares).into_iter().filter(|pair| own.binary_search(pair).is_err());
         let corners = new.flatten().flat_map(|triangle| self.triangles[triangle as usize]);

@@ -1,4 +1,4 @@
-//! A step of the mesh while its liquid keeps its topology: it is carried along and projected, fades, and is eased for display.
+//! The part of a step that does not change topology: advection, projection and fading of detail; also easing for display.
 
 pub(in crate::surface) mod advect;
 pub(in crate::surface) mod deep_detail;

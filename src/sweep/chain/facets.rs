@@ -23,18 +23,18 @@ use crate::sweep::signed_distance::exposure::{BURIED, Exposure, OPEN, THIN};
 /// A part of a face, and whether it is known to be open throughout ([`Facet::sure`]).
 type Part = (Corners, bool);
 
-/// Depth (fixed-point units) up to which a sheet counts as surface: the sides of a sweep are folds of many sheets that are closer together
-/// than the sweep's own tolerance.
+/// Distance (fixed-point units) in front of and behind a face at which the chain is sampled; sheets within it count as one. The sides of a
+/// sweep are folds of many sheets that are closer together than the sweep's own tolerance.
 const HAIR: f64 = 0.005 * UNITS as f64;
 /// [`THIN`], in hairs.
 const THIN_HAIRS: f64 = THIN * UNITS as f64 / HAIR;
 /// Faces longer than this (cells) are sampled at more than one point.
 const SMALL: f32 = 1.5;
-/// Lines that are a cell apart cross most faces longer than this (cells).
+/// Scan lines, a cell apart, cross most faces longer than this (cells).
 const LONG: f32 = 3.0;
 /// Distance between the samples of a long face (fixed-point units).
 const SPACING: f64 = 1.2 * UNITS as f64;
-/// Their spacing where a face is sampled again because it is buried among open ones.
+/// The same where a face is sampled again because it is buried among open ones.
 const CLOSER: f64 = 0.6 * UNITS as f64;
 /// Sample points at corners are moved this fraction of the way to the centre, away from the edges shared with neighbours.
 const INSET: f64 = 0.05;
@@ -50,7 +50,8 @@ const SLIVER: u8 = 16;
 const SPECK: u8 = 32;
 /// The small faces of a stack are sampled in bins with at most this many faces.
 const MANY: usize = 2000;
-/// Gaps in front of an open face are wider than this (hairs). Sheets of successive poses leave narrower slits, within the motion's tolerance.
+/// A face in front of which there is a gap narrower than this (hairs) is not open: sheets of successive poses leave such slits, within the
+/// motion's tolerance.
 const SLIT: f64 = 3.0;
 const OPEN_AND_LOOSE: u8 = OPEN | LOOSE;
 /// Faces per task: fixed, so that nothing depends on the number of threads.
@@ -342,7 +343,7 @@ impl Clipper<'_> {
         classify(self.bins, self.exposure, at, hair, &mut self.prisms)
     }
 
-    /// Whether distances may be wanted near a point where patches of a stack do not provide them.
+    /// Whether the surface near a point does not consist of patches only, so that samples are needed.
     fn is_sampled(&self, at: Point) -> bool {
         self.bins.of_voxel(voxel_of(at)).is_some_and(|bin| !self.exposure.stacks[bin])
     }

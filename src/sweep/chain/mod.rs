@@ -1,7 +1,7 @@
 //! The signed space-time chain of a moving mesh and its boundary.
 //!
 //! Between two poses each triangle sweeps a prism, split into three tetrahedra by ascending vertex index so that neighbours match: T1 = (a0
-//! a1 a2 b2), T2 = (a0 a1 b1 b2), T3 = (a0 b0 b1 b2), where a is the earlier and b the later pose. The chain is the solid at the first pose
+//! a1 a2 b2), T2 = (a0 a1 b1 b2), T3 = (a0 b0 b1 b2), where a is the earlier pose and b the later. The chain is the solid at the first pose
 //! plus every tetrahedron through which the surface moves outward (with the exceptions in [`folds`]); points with winding number > 0 are
 //! the swept volume. Only the boundary of the chain is built: faces between two tetrahedra that are both in the chain, or both not in it,
 //! cancel and are never made.
@@ -32,7 +32,7 @@ pub struct Weights {
     pub swept: i32,
 }
 
-/// Outward motion below this (fixed-point units) counts as none: otherwise its sign would be decided by rounding.
+/// Outward motion below this (fixed-point units) counts as none: otherwise rounding would decide its sign.
 pub const STILL: f64 = 4.0 / 4096.0 * UNITS as f64;
 /// Triangles or edges per task: fixed, so that the order of faces never depends on the number of threads.
 const GRAIN: usize = 2048;

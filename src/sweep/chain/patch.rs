@@ -17,7 +17,7 @@ use crate::sweep::signed_distance::exposure::{Exposure, Spot};
 
 /// Maximum distance (cells) of the surface from a patch's plane.
 const OFF: f64 = 0.04;
-/// The same on the neighbouring lines: between them the surface is nearer to the plane.
+/// The same on the neighbouring lines, which are a cell away: the patch reaches only half as far.
 const OFF_BESIDE: f64 = 2.0 * OFF;
 /// Half the edge (cells, seen along its line) of a square patch, used where the neighbouring lines agree with its plane.
 const HALF: f64 = 0.51;

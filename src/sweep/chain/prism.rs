@@ -9,7 +9,7 @@ use crate::numeric::cpu::dispatch;
 const LANES: usize = 8;
 /// Values closer to 0 than this (cells) are not decided in 32-bit arithmetic.
 const CLEAR: f32 = 1e-3;
-/// Maximum distance (cells) from a query point of the points beside it whose winding numbers are found together with its own.
+/// Maximum distance (cells) between a query point and the point beside it, whose winding numbers are found together.
 pub const BESIDE: f32 = 0.02;
 
 /// Height above the triangle's plane, then for each edge the distance to its inner side (cells), as linear functions of a position: `f[0] *

@@ -1,4 +1,4 @@
-//! A moving body as the chain needs it: closed triangles, and poses at suitable times.
+//! A moving body, prepared for the chain: closed triangles, and poses at suitable times.
 
 use std::sync::Arc;
 
@@ -20,15 +20,16 @@ use crate::motion::Motion;
 use crate::sweep::chain::{Weights, boundary};
 use crate::sweep::window::Window;
 
-/// Length of a step's path relative to the pieces that edges are split into; by measurement, this value gave the fewest faces and the
-/// shortest time.
+/// Factor on the number of steps at which a vertex' path in a step is as long as the pieces that edges are split into; by measurement, this
+/// value gave the fewest faces and the shortest time.
 const SHORTER: f64 = 1.5;
-/// Steps need not be shorter than this (cells), nor more than [`MAX_OVER_ARCS`] times as many as arcs need; also measured.
+/// The faces of edges need at most as many steps as paths of this length (cells) do, or [`MAX_OVER_ARCS`] times as many as arcs do, whichever
+/// is more; also measured.
 const MIN_PATH: f64 = 4.0;
 const MAX_OVER_ARCS: f64 = 1.5;
 /// Maximum number of steps in an interval between two breaks of a motion.
 const MAX_STEPS: f64 = 1024.0;
-/// Maximum rotation (radians) in an interval whose arcs are judged from five poses: a quarter turn.
+/// Maximum rotation (radians) in an interval for which five poses show the deviation from straight paths: a quarter turn.
 const INTERVAL_ROTATION: f64 = std::f64::consts::FRAC_PI_2;
 /// Maximum rotation in a frame (radians): 64 turns.
 const MAX_ROTATION: f64 = 64.0 * std::f64::consts::TAU;
@@ -46,13 +47,13 @@ pub struct Body {
     name: Option<String>,
 }
 
-/// What does not change while a body's vertices move: its topology and orientation.
+/// The part of a body that does not change while its vertices move: topology and orientation.
 pub struct Shape {
     /// Hash of the triangles.
     triangles: u128,
     /// For each vertex, the first vertex at the same position; itself if there is none before it.
     exact: Vec<u32>,
-    /// The boundary that remains when these are joined.
+    /// The boundary of the mesh after vertices at the same position are joined.
     boundary: Boundary,
     /// Which vertices form one corner, including those within rounding of one another.
     weld: Weld,
@@ -77,8 +78,8 @@ impl Body {
         Self::shaped(motion, time, None)
     }
 
-    /// As [`Body::new`]; `known` is the shape of an earlier body, which is shared if this body has the same shape and, with it, a volume
-    /// that is not negative.
+    /// As [`Body::new`]; `known` is the shape of an earlier body, which is shared if it fits this body and gives it a volume that is not
+    /// negative.
     ///
     /// # Errors
     /// As [`Body::new`].
@@ -428,7 +429,7 @@ impl Shape {
         let (mut oriented, mut topology, mut contradictions) = of(&orientation);
         topology.close();
         if orientation.has_open() {
-            // As the motion has the triangles, all of them.
+            // The volume with all triangles as the motion has them, open components included.
             let mut closed = pose.to_vec();
             topology.complete(&mut closed);
             let [before, now] = orientation.volumes();

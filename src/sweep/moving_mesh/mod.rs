@@ -1,4 +1,4 @@
-//! A moving mesh as the chain needs it: topology, poses, and the points that its surface passes.
+//! A moving mesh, prepared for the chain: topology, poses, and the points that its surface passes.
 
 pub(in crate::sweep) mod body;
 pub(in crate::sweep) mod passages;

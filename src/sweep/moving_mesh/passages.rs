@@ -28,12 +28,12 @@ pub fn face(simplex: &Simplex, level: &[Fixed]) -> Face {
     Face { v: if simplex.sign > 0 { [a, b, c] } else { [a, c, b] }, coef: 1 }
 }
 
-/// Identifies one of the tetrahedra that the surface passes through.
+/// Identifies a [`Passage`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct PassageId {
     /// The triangle whose prism it is part of.
     pub triangle: u32,
-    /// From this pose to the next.
+    /// The step from this pose to the next.
     pub step: u32,
     /// Which of the prism's three tetrahedra, from 0.
     pub part: u32,

@@ -157,7 +157,7 @@ impl Topology {
         (0..self.edges.len()).any(|edge| self.beside(edge).len() == 1)
     }
 
-    /// Edges along which two or more triangles run in one direction without a counterpart.
+    /// Count of edges along which two or more triangles run in one direction without a counterpart.
     pub fn contradictions(&self) -> usize {
         (0..self.edges.len()).filter(|&edge| self.imbalance(edge).abs() > 1).count()
     }

@@ -19,8 +19,8 @@ const GRAIN: usize = 1024;
 const FEW: usize = 8;
 /// Sentinel: no slot.
 const NONE: u32 = u32::MAX;
-/// Offset (units) of a voxel from its lattice point: the symbolic shift of the scan lines (`distance/winding.rs`), mostly -z, then +x, then
-/// +y. It is less than one unit, so no face lies in between.
+/// The symbolic shift of voxels (`distance/winding.rs`) as a vector (units): mostly -z, then +x, then +y. It is less than one unit, so that
+/// no face lies between a voxel and its shifted position.
 const NUDGE: Point = [0.25 / 64.0, 0.25 / 4096.0, -0.25];
 /// Tolerance (cells) for a plane that touches the corner of a cube.
 const TOUCH: f64 = 1e-5;
@@ -125,8 +125,8 @@ impl Bins {
         (slot != NONE).then(|| &self.blocks[slot as usize])
     }
 
-    /// Winding numbers of the chain at a point and at `beside`, at most [`crate::sweep::chain::prism::BESIDE`] cells from it (fixed-point
-    /// units): that of the nearest voxel, corrected by the faces in between.
+    /// Winding numbers of the chain at a point (fixed-point units) and at `beside`, at most [`crate::sweep::chain::prism::BESIDE`] cells from
+    /// it: that of the nearest voxel, corrected by the faces in between.
     pub fn windings(&self, point: Point, beside: Point, prisms: &mut Prisms) -> [i32; 2] {
         let voxel = voxel_of(point);
         let mut winding = self.lines.winding(voxel);

@@ -1,5 +1,5 @@
-//! Depths of voxels inside the volume. Facets that were clipped too generously extend into the volume: their points there do not count as
-//! surface.
+//! Depths of voxels inside the volume. Facets may extend into the volume, as they are clipped only coarsely: points of them that are not open
+//! do not count as surface.
 
 use std::borrow::Cow;
 use std::cell::RefCell;
@@ -151,8 +151,8 @@ impl Part {
     }
 }
 
-/// Depths of a group's voxels: distances to their nearest facets or, where the nearest point of a facet is not open because the facet was
-/// clipped too generously, to the nearest open point.
+/// Depths of a group's voxels: distances to their nearest facets or, where the nearest point of a facet is not open, to the nearest open
+/// point.
 pub struct Depths<'a, 'n> {
     near: &'a NearFacets<'n>,
     group: &'a Group<'a>,

@@ -24,8 +24,7 @@ pub const OPEN: u8 = 1;
 /// Flag of a face that lies deeper somewhere.
 pub const BURIED: u8 = 2;
 /// Depth (cells) up to which a sheet counts as surface. A body that turns about an axis of near symmetry sweeps bundles of nearly
-/// coincident sheets: each is outermost only in slivers between its neighbours, and elsewhere lies below them by up to the motion's
-/// tolerance.
+/// coincident sheets: each is outermost only in slivers, and elsewhere lies below its neighbours by up to the motion's tolerance.
 pub const THIN: f64 = 0.05;
 
 /// Faces per task: fixed, so that nothing depends on the number of threads.
@@ -41,7 +40,7 @@ const BUNDLE: usize = 3;
 const MIN_FACES: usize = 32;
 /// A gap between sheets that is narrower than this (cells) and contains no voxel counts as closed.
 const CLOSED: f64 = 0.01;
-/// A spot makes a patch if the component of the face's normal along its line is at least this share of the largest of the three.
+/// A patch is made at a spot if the component of the face's normal along the line is at least this fraction of the largest component.
 const STEEP: f64 = 0.9;
 
 /// What lines through voxels reveal about a chain.
@@ -50,9 +49,9 @@ pub struct Exposure {
     pub faces: Vec<u8>,
     /// The meetings along each axis.
     along: Vec<Along>,
-    /// Whether each bin holds a stack: so many sheets that its surface is made only of patches.
+    /// Whether each bin holds a stack: its surface consists only of patches.
     pub stacks: Vec<bool>,
-    /// Whether each bin holds a stack or a bundle: sheets so close together that patches are added.
+    /// Whether each bin holds a stack or a bundle: patches are added there.
     bundles: Vec<bool>,
 }
 
@@ -64,7 +63,7 @@ struct Along {
     meetings: Lists<Meeting>,
 }
 
-/// See [`Spot`].
+/// A crossing at which a line enters or leaves the volume; the fields are those of [`Spot`].
 #[derive(Debug, Clone, Copy, Default)]
 struct Meeting {
     position: f64,
@@ -104,7 +103,7 @@ struct Crossing {
     face: u32,
 }
 
-/// What lines reveal about faces and bins; written by many tasks at once.
+/// Results of the scan for faces and bins, written by many tasks at once.
 struct Marks {
     faces: Vec<AtomicU8>,
     /// Crossings in each bin.

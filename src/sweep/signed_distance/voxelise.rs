@@ -96,7 +96,7 @@ const BLOCK_RADIUS: f32 = 6.07;
 const SMALL: f32 = 1.0;
 /// A voxel nearer than this (cells) lies on the surface.
 const ON_FACE: f32 = 1e-4;
-/// Upper bound (cells) on the distance of a voxel whose neighbour has the opposite sign where no line has a meeting between them: the
+/// Upper bound (cells) on the distance of a voxel whose neighbour has the opposite sign, for a pair without a meeting between them: the
 /// surface then touches one of the two.
 const UNSEEN: f32 = 1.0;
 /// All voxels of a block.

@@ -16,9 +16,10 @@
 //! | beyond reach, elsewhere | given: Gamma - phi |
 //!
 //! Far from the mesh Gamma and phi are clamped, each at its band, and their difference means little: if it were given everywhere along the
-//! rim, it would distort the result at flagged nodes (between two balls by 0.1 to 0.3 at a reach of 8, by 0.02 at most with these rules). It
-//! is needed where phi alone would change a sign: without it, a drop of phi that lies across the rim would be cut in two. As a last resort a
-//! free node beside one beyond reach keeps its Gamma if its sign would change. So no edge across the rim gains or loses a crossing.
+//! rim (the border of the reach), it would distort the result at flagged nodes (between two balls by 0.1 to 0.3 at a reach of 8, by 0.02 at
+//! most with these rules). It is needed where phi alone would change a sign: without it, a drop of phi that lies across the rim would be cut
+//! in two. As a last resort a free node beside one beyond reach keeps its Gamma if its sign would change. So no edge of the grid across the
+//! rim gains or loses a crossing.
 
 pub(in crate::surface) mod nodes;
 mod solve;
@@ -47,7 +48,7 @@ pub enum Solver {
 pub struct Matching {
     /// Solver of the equation.
     pub solver: Solver,
-    /// The iteration ends when no psi changes by this much (cells), over 0; the thesis' is 0.01.
+    /// The iteration ends when no psi changes by this much (cells), over 0 (thesis: 0.01).
     pub tolerance: f64,
     /// Distance from flagged nodes, on each axis, within which it is solved (cells), at least 1; beyond, Gamma stays.
     pub reach: i32,

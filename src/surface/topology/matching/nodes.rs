@@ -57,7 +57,7 @@ impl Free {
                 }
                 row.is_rim |= role == Role::Kept;
                 let node = &nodes[sorted[other as usize].1 as usize];
-                if role == Role::Fixed || !keeps_its_side(node) {
+                if role == Role::Fixed || !has_same_side(node) {
                     row.given += 1;
                     row.load += f64::from(node.gamma) - f64::from(node.phi);
                 }
@@ -74,13 +74,13 @@ impl Free {
     }
 }
 
-/// Whether a surface at this distance from a node (cells) may pass through a cell at it: |d| <= sqrt(3).
+/// Whether a surface at this distance from a node (cells) may pass through one of the cells around it: |d| <= sqrt(3).
 fn is_near(distance: f32) -> bool {
     f64::from(distance) * f64::from(distance) <= 3.0
 }
 
-/// Whether phi alone clearly puts a node on the same side as Gamma.
-fn keeps_its_side(node: &Node) -> bool {
+/// Whether phi has Gamma's sign at a node, and its surface is not near.
+fn has_same_side(node: &Node) -> bool {
     (node.phi < 0.0) == (node.gamma < 0.0) && !is_near(node.phi)
 }
 

@@ -12,7 +12,8 @@ use crate::error::Result;
 /// Sentinel: no node.
 pub const NONE: u32 = u32::MAX;
 
-/// The equation of a free node: the count of nodes that it depends on times its psi, minus the psi of the free ones among them, is the load.
+/// The equation of a free node: its psi times the count of nodes that it depends on, minus the sum of psi of the free ones among them, equals
+/// the load.
 #[derive(Debug, Clone, Copy)]
 pub struct Row {
     /// The free nodes before and behind it on x, y and z, as indices of rows; [`NONE`]: there is none.
@@ -246,7 +247,7 @@ fn connected_to_given(rows: &[Row]) -> Vec<bool> {
     is_connected
 }
 
-/// Maximum number of consecutive held nodes on any axis.
+/// Maximum number of consecutive connected nodes on any axis.
 fn widest(rows: &[Row], is_connected: &[bool]) -> u32 {
     // Length of the run that ends at each node: rows ascend by position, so that earlier ones are known.
     let mut runs = vec![[0u32; 3]; rows.len()];
