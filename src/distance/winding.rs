@@ -166,8 +166,8 @@ impl Axis {
 }
 
 /// Whether the line through voxels with these coordinates passes left of the path from `a` to `b`, seen with the first rotated coordinate
-/// ([`Axis::rotated`]) to the right and the second upward; exact, under the symbolic shift. Swapping `a` and `b` negates it; it is undefined
-/// if they are the same point.
+/// ([`Axis::rotated`]) to the right and the second upward; exact, under the symbolic shift. Swapping `a` and `b` negates it; it is
+/// undefined if they are the same point.
 pub fn passes_left(axis: Axis, a: Fixed, b: Fixed, [p, q]: [i32; 2]) -> bool {
     let [a, b] = [a, b].map(|end| axis.rotated(end)).map(|[p, q, _]| [p, q]);
     let p = if axis == Axis::Z { p } else { -p };

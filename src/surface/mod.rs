@@ -7,8 +7,8 @@
 //! merged or split: they are flagged, and so are those beside which the mesh does not cover the surface (`topology/coverage.rs`).
 //!
 //! There the mesh is changed (`topology/update.rs`, `topology/change.rs`): its own signed distances take the topology of phi
-//! (`topology/mesh_distance.rs`, `topology/matching/`), and it is cut and rebuilt in the cells where it no longer fits (`mesh_repair`). Parts
-//! without liquid are removed (`topology/dry_parts.rs`), stretched edges are split and compressed ones collapsed (`remesh/`).
+//! (`topology/mesh_distance.rs`, `topology/matching/`), and it is cut and rebuilt in the cells where it no longer fits (`mesh_repair`).
+//! Parts without liquid are removed (`topology/dry_parts.rs`), stretched edges are split and compressed ones collapsed (`remesh/`).
 //!
 //! # Glossary
 //!

@@ -23,9 +23,9 @@ pub struct Params {
     /// If it is rebuilt: whether its topology is matched to that of the particles everywhere and in every step (thesis 2.8), including
     /// bubbles; if not, only where vertices are flagged, and at drops.
     pub every: bool,
-    /// If it is rebuilt: minimum count of particles in a part of the mesh, 0..=1,000,000. Parts with fewer are removed, and drops with fewer
-    /// get no mesh; with 0 and 1 only parts without any particle inside are removed. If at least one lies inside, those outside within half
-    /// a spacing of the part count too. The last part is never removed.
+    /// If it is rebuilt: minimum count of particles in a part of the mesh, 0..=1,000,000. Parts with fewer are removed, and drops with
+    /// fewer get no mesh; with 0 and 1 only parts without any particle inside are removed. If at least one lies inside, those outside
+    /// within half a spacing of the part count too. A mesh of one part stays.
     pub min_drop: usize,
 }
 

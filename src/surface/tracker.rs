@@ -36,8 +36,8 @@ const TRIES: [f64; 2] = [5.0, REACH[1]];
 
 /// The reach covers the distance of this fraction of the vertices, so that a spike does not widen the band everywhere.
 const REACHED: f64 = 0.999;
-/// If `REACHED` would need a reach above `WIDE` (r), the reach covers only the fraction `REACHED_IF_WIDE`, but is at least `WIDE`; around the
-/// remaining vertices the band is widened locally.
+/// If `REACHED` would need a reach above `WIDE` (r), the reach covers only the fraction `REACHED_IF_WIDE`, but is at least `WIDE`; around
+/// the remaining vertices the band is widened locally.
 const WIDE: f64 = 2.5;
 const REACHED_IF_WIDE: f64 = 0.95;
 /// Minimum displacement of a vertex by projection (r): anything less is rounding.
@@ -49,13 +49,14 @@ impl Tracker {
     /// Starts to track a mesh as it is at the first frame, in the particles' space.
     ///
     /// # Errors
-    /// Parameters out of range; a mesh or particles that are not valid; over half of the vertices far from the particles' surface; a mesh to
-    /// be rebuilt that is not closed and 2-manifold by index; cancel.
+    /// Parameters out of range; a mesh or particles that are not valid; over half of the vertices far from the particles' surface; a mesh
+    /// to be rebuilt that is not closed and 2-manifold by index; cancel.
     pub fn new(ctx: &Context, params: Params, mesh: &TriMesh, particles: &Particles) -> Result<Self> {
         Ok(Self::begin(ctx, params, mesh, particles)?.0)
     }
 
-    /// As [`Tracker::new`], with a report of the first frame: vertices too far from the particles' surface to keep a distance count as lost.
+    /// As [`Tracker::new`], with a report of the first frame: vertices too far from the particles' surface to keep a distance count as
+    /// lost.
     ///
     /// # Errors
     /// As [`Tracker::new`].
@@ -261,7 +262,8 @@ impl Tracker {
         })
     }
 
-    /// The uncovered part of the particles' surface: whole connected parts, uncovered positions of the others, and the vertices beside these.
+    /// The uncovered part of the particles' surface: whole connected parts, uncovered positions of the others, and the vertices beside
+    /// these.
     fn coverage(
         &self,
         ctx: &Context,

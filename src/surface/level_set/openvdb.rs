@@ -79,8 +79,8 @@ pub fn spheres(ctx: &Context, positions: &[DVec3], radius: f64, cell: f64) -> Re
     Ok(grid)
 }
 
-/// Upper bound on the count of blocks within `reach` (cells) of positions (m): the blocks in cubes at least that long that contain positions,
-/// and in the cubes around these.
+/// Upper bound on the count of blocks within `reach` (cells) of positions (m): the blocks in cubes at least that long that contain
+/// positions, and in the cubes around these.
 fn max_blocks(positions: &[DVec3], reach: f64, cell: f64) -> u64 {
     let blocks = (reach / DIM as f64).ceil();
     let edge = blocks * DIM as f64 * cell;

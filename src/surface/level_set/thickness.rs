@@ -1,19 +1,19 @@
 //! How thick the liquid is around a node, so that sheets and threads thinner than the particle spacing keep their volume.
 //!
-//! Solenthaler et al. (2007) put the surface one spacing r from the particles' mean. That is right at the surface of a large body, where the
-//! mean lies r deep. The mean of a sheet lies in its middle, so that its surface would be r from there however thin the sheet is. Half of
-//! its thickness replaces r where it is less.
+//! Solenthaler et al. (2007) put the surface one spacing r from the particles' mean. That is right at the surface of a large body, where
+//! the mean lies r deep. The mean of a sheet lies in its middle, so that its surface would be r from there however thin the sheet is. Half
+//! of its thickness replaces r where it is less.
 //!
 //! The thickness follows from the particles' mass, r^3 each, and from their spread: in a sheet of thickness w the sum of q^2
-//! (q = 1 - d^2 / R^2) is w pi R^2 Q^3 / 3 / r^3, Q being q at the sheet's middle, and the variance along the sheet is R^2 Q / 8. Where they
-//! spread less, at rims, in ribbons and threads, they fill less of the sheet, and it is thicker by the same factor.
+//! (q = 1 - d^2 / R^2) is w pi R^2 Q^3 / 3 / r^3, Q being q at the sheet's middle, and the variance along the sheet is R^2 Q / 8. Where
+//! they spread less, at rims, in ribbons and threads, they fill less of the sheet, and it is thicker by the same factor.
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 use super::SUPPORT;
 
-/// Minimum distance of a surface from a sheet's middle (cells). Nodes inside a sheet must be neighbours along edges of the grid, or marching
-/// cubes break it up: whatever its orientation, its sides must be apart by the diagonal of a cell's face.
+/// Minimum distance of a surface from a sheet's middle (cells). Nodes inside a sheet must be neighbours along edges of the grid, or
+/// marching cubes break it up: whatever its orientation, its sides must be apart by the diagonal of a cell's face.
 const MIN_DISTANCE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Sums over the particles around a node, weighted by q^2; lengths are in cells.

@@ -12,15 +12,15 @@ use crate::surface::report::StepReport;
 
 /// Particles that are sampled.
 const SAMPLES: usize = 2000;
-/// If the median relative displacement of neighbouring particles in a frame is over this (spacings), ids do not identify them: in a splashing
-/// dam break it is 0.2.
+/// If the median relative displacement of neighbouring particles in a frame is over this (spacings), ids do not identify them: in a
+/// splashing dam break it is 0.2.
 const TOO_FAR_APART: f64 = 1.0;
 /// Distance (spacings) up to which particles are neighbours.
 const BESIDE: f64 = 1.5;
 /// Velocities are wrong if over this fraction of particles finds no other particle where its velocity takes it.
 const MISSED: f64 = 0.5;
-/// If over the first fraction misses, factors on the velocities are tried; the best one is reported if it makes the fraction smaller by more
-/// than the second number, a factor.
+/// If over the first fraction misses, factors on the velocities are tried; the best one is reported if it makes the fraction smaller by
+/// more than the second number, a factor.
 const SOME_MISSED: [f64; 2] = [0.05, 4.0];
 /// Factors between units: feet, ten, inches, centimetres and millimetres. Of equally good factors the first is taken: very small velocities
 /// leave all particles within the liquid, and miss nothing.

@@ -1,7 +1,7 @@
 //! The path of each particle from one frame to the next.
 //!
-//! Particles are matched by id, since files order them differently in each frame. With velocities a path is a cubic Hermite curve, otherwise
-//! a line. Without ids the displacement is the velocity times the time.
+//! Particles are matched by id, since files order them differently in each frame. With velocities a path is a cubic Hermite curve,
+//! otherwise a line. Without ids the displacement is the velocity times the time.
 
 use std::collections::HashMap;
 

@@ -20,9 +20,9 @@ const DOUBLINGS: u32 = 1;
 /// Cells along a radius.
 const RINGS: i32 = 2;
 /// Particles have the same origin if their first positions lie within this many radii (4 spacings) of that of their representative. The
-/// particles around a position on the surface lie little more than a radius from the nearest one, so that liquid that has kept its shape has
-/// a single origin. Two bodies that were more than 4 spacings apart have two; if the gap was narrower, results between them are off by less
-/// than the gap. Where the liquid was compressed by more, only the nearest particles count.
+/// particles around a position on the surface lie little more than a radius from the nearest one, so that liquid that has kept its shape
+/// has a single origin. Two bodies that were more than 4 spacings apart have two; if the gap was narrower, results between them are off by
+/// less than the gap. Where the liquid was compressed by more, only the nearest particles count.
 const TOGETHER: f64 = 4.0 / 3.0;
 /// Positions per task.
 const PIECE: usize = 256;
@@ -54,9 +54,9 @@ impl Rest {
     }
 
     /// Where the liquid at positions (m) was at the first frame (m), from the particles `now` around them, whose spacing is `spacing` (m).
-    /// Their displacements back to the first frame are fitted by an affine map, like those of advection; of particles with different origins
-    /// only those of the origin with the largest total weight count. None if no particle that existed at the first frame is within three
-    /// spacings (six, if no other one is either), or particles have no ids. The results for different positions are independent.
+    /// Their displacements back to the first frame are fitted by an affine map, like those of advection; of particles with different
+    /// origins only those of the origin with the largest total weight count. None if no particle that existed at the first frame is within
+    /// three spacings (six, if no other one is either), or particles have no ids. The results for different positions are independent.
     ///
     /// # Errors
     /// A spacing that is not over 0; particles too far apart; cancel.
@@ -233,8 +233,8 @@ impl Field {
     }
 }
 
-/// Groups particles by origin: those whose first positions lie within `max_distance` (m) of that of the heaviest particle left form a group,
-/// represented by it. Returns the representative of the group with the largest total weight; none without particles.
+/// Groups particles by origin: those whose first positions lie within `max_distance` (m) of that of the heaviest particle left form a
+/// group, represented by it. Returns the representative of the group with the largest total weight; none without particles.
 fn heaviest_origin(neighbours: &mut [Neighbour], max_distance: f64) -> Option<usize> {
     let mut left: f64 = neighbours.iter().map(|one| one.weight).sum();
     let mut best: Option<(f64, usize)> = None;

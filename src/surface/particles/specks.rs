@@ -6,8 +6,8 @@ use crate::geometry::DVec3;
 use crate::geometry::check::topology::Sets;
 use crate::geometry::coords::around;
 
-/// Whether each particle, at positions (m) whose spacing is `spacing` (m), belongs to a group of fewer than `min_count`. Two particles are in
-/// the same group if they lie in the same cell of one spacing, or in cells that touch.
+/// Whether each particle, at positions (m) whose spacing is `spacing` (m), belongs to a group of fewer than `min_count`. Two particles are
+/// in the same group if they lie in the same cell of one spacing, or in cells that touch.
 ///
 /// # Errors
 /// Particles too far apart.

@@ -15,8 +15,8 @@ const DOUBLINGS: u32 = 4;
 const PIECE: usize = 256;
 
 /// Weighted means, at vertices (m), of the values of particles at positions (m) whose spacing is `spacing` (m): a particle at a distance d
-/// has the weight (1 - (d / R)^2)^3. Each column has one value for each particle; each result has one for each vertex, 0 where no particle is
-/// near.
+/// has the weight (1 - (d / R)^2)^3. Each column has one value for each particle; each result has one for each vertex, 0 where no particle
+/// is near.
 ///
 /// # Errors
 /// Particles too far apart; cancel.

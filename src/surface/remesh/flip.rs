@@ -14,8 +14,8 @@ const GAIN: f64 = 5.0;
 const FLAT: f64 = 0.866;
 
 impl VertexRings<'_, '_> {
-    /// The edge of a triangle whose flip is best. None if its angles are not small, or no flip is clearly better; the artist's own triangles
-    /// and those at flagged vertices are not flipped.
+    /// The edge of a triangle whose flip is best. None if its angles are not small, or no flip is clearly better; the artist's own
+    /// triangles and those at flagged vertices are not flipped.
     pub fn best_flip(&self, triangle: u32) -> Option<Edge> {
         let is_allowed = self.exists(triangle) && !self.is_whole(triangle);
         if !is_allowed || min_angle(&self.positions(triangle)) >= MIN_ANGLE {

@@ -1,10 +1,11 @@
 //! Mesh improvement (thesis 2.6): edges are split where the tracked mesh was stretched and collapsed where it was compressed, and edges of
-//! thin new triangles are flipped. The reference is the length that the edges around a vertex had at its birth: long and short edges stay as
-//! they were sculpted. Nearly all of a mesh needs no change, and stays as it is, bit for bit; so does all of a mesh at rest (`strain.rs`).
+//! thin new triangles are flipped. The reference is the length that the edges around a vertex had at its birth: long and short edges stay
+//! as they were sculpted. Nearly all of a mesh needs no change, and stays as it is, bit for bit; so does all of a mesh at rest
+//! (`strain.rs`).
 //!
 //! After Wojtan et al. 2009, and Brochu and Bridson 2009 ("Robust topological operations for dynamic explicit surfaces") for the
-//! preservation of ridges and corners. `remesh/vertex_rings.rs` has the operations, `butterfly.rs`, `collapse.rs`, `flip.rs` and `relax.rs` decide where
-//! they are applied and whether they are allowed.
+//! preservation of ridges and corners. `remesh/vertex_rings.rs` has the operations, `butterfly.rs`, `collapse.rs`, `flip.rs` and `relax.rs`
+//! decide where they are applied and whether they are allowed.
 //!
 //! | word | meaning |
 //! |---|---|

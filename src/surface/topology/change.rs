@@ -209,9 +209,10 @@ fn find_unfit_cells(
     Ok((shape, flagged))
 }
 
-/// Finishes a change, or the unchanged mesh: removes parts with too few particles, improves the mesh (thesis 2.6), and measures the deltas of
-/// new vertices. `sizes` and `drifts` are those of the vertices before the change. Deltas of new vertices are clamped to `max_delta` (m):
-/// anything farther from the particles' surface is no detail; the next frame moves it nearer, or rebuilds it. None if nothing has changed.
+/// Finishes a change, or the unchanged mesh: removes parts with too few particles, improves the mesh (thesis 2.6), and measures the deltas
+/// of new vertices. `sizes` and `drifts` are those of the vertices before the change. Deltas of new vertices are clamped to `max_delta`
+/// (m): anything farther from the particles' surface is no detail; the next frame moves it nearer, or rebuilds it. None if nothing has
+/// changed.
 ///
 /// # Errors
 /// Cancel.

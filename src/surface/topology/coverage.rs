@@ -1,6 +1,6 @@
-//! Uncovered positions of the particles' surface, on connected parts that the mesh covers elsewhere: a bridge that has just grown between two
-//! bodies, the rim of a hole. They reveal a change before a vertex jumps there. The thesis (2.3.3) has no such early test: it misses a thread
-//! that forms between vertices, as that moves none of them.
+//! Uncovered positions of the particles' surface, on connected parts that the mesh covers elsewhere: a bridge that has just grown between
+//! two bodies, the rim of a hole. They reveal a change before a vertex jumps there. The thesis (2.3.3) has no such early test: it misses a
+//! thread that forms between vertices, as that moves none of them.
 //!
 //! The surface is covered by the triangles of feet. Where nothing changes, these lie on it.
 

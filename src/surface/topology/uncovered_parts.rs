@@ -105,8 +105,9 @@ impl Parts {
         MissingParts { positions, specks }
     }
 
-    /// Those of `drops` (ascending) that contain too few particles, and those of `bubbles` (each with a position (m) on it) that lie in such
-    /// a drop; also the bounds (cells) of these drops. `Change::drop_dry` counts in the same way, so that no new mesh is removed at once.
+    /// Those of `drops` (ascending) that contain too few particles, and those of `bubbles` (each with a position (m) on it) that lie in
+    /// such a drop; also the bounds (cells) of these drops. `Change::drop_dry` counts in the same way, so that no new mesh is removed at
+    /// once.
     fn specks(
         &self,
         phi: &Implicit,

@@ -1,6 +1,6 @@
-//! Easing of topology changes (thesis 2.8 wishes for it): vertices that a change will remove move towards what will replace them, a fraction
-//! of the displacement in each of the frames before it, so that a bridge does not pop up. This affects only the displayed mesh, not the
-//! tracked one.
+//! Easing of topology changes (thesis 2.8 wishes for it): vertices that a change will remove move towards what will replace them, a
+//! fraction of the displacement in each of the frames before it, so that a bridge does not pop up. This affects only the displayed mesh,
+//! not the tracked one.
 
 use rayon::prelude::*;
 
@@ -222,8 +222,8 @@ impl Patch {
     }
 
     /// The new positions (`made`) at parts of the patch where the surface jumps: each belongs to the nearest part (whose vertices lie at
-    /// `begin`), and a part jumps if one of its positions is farther away than `near`. Positions farther than `longest` from all parts belong
-    /// to another surface, and are left out.
+    /// `begin`), and a part jumps if one of its positions is farther away than `near`. Positions farther than `longest` from all parts
+    /// belong to another surface, and are left out.
     fn positions_at_jumps(&self, begin: &[DVec3], made: Vec<DVec3>, [near, longest]: [f64; 2]) -> Vec<DVec3> {
         let mut part_of = vec![0; self.triangles.len()];
         let parts = bodies(&self.triangles);

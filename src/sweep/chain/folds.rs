@@ -3,8 +3,8 @@
 //! A point is swept when its winding number reaches 1 at some time. Where the winding number of a pose is negative, because the surface is
 //! inside out, outward motion only brings it back to 0: the point is not swept, although the surface passed it outward. Near such positions
 //! each outward passage is therefore tested at sample points: the winding number of the pose before, plus the passages earlier in the same
-//! step, must not be negative, or the passage does not count. Where the first pose has a negative winding number, the chain also starts below
-//! 0: the passage that first brings it to 0 counts.
+//! step, must not be negative, or the passage does not count. Where the first pose has a negative winding number, the chain also starts
+//! below 0: the passage that first brings it to 0 counts.
 
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -110,8 +110,8 @@ impl Folded {
     }
 }
 
-/// A window grown by the largest displacement from the first pose: vertices that enter the window later are inside the grown one at the first
-/// pose.
+/// A window grown by the largest displacement from the first pose: vertices that enter the window later are inside the grown one at the
+/// first pose.
 fn grown(window: &Window, levels: &[Vec<Fixed>]) -> Window {
     let displacement = |level: &Vec<Fixed>| {
         let displacements =

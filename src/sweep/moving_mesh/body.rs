@@ -23,8 +23,8 @@ use crate::sweep::window::Window;
 /// Factor on the number of steps at which a vertex' path in a step is as long as the pieces that edges are split into; by measurement, this
 /// value gave the fewest faces and the shortest time.
 const SHORTER: f64 = 1.5;
-/// The faces of edges need at most as many steps as paths of this length (cells) do, or [`MAX_OVER_ARCS`] times as many as arcs do, whichever
-/// is more; also measured.
+/// The faces of edges need at most as many steps as paths of this length (cells) do, or [`MAX_OVER_ARCS`] times as many as arcs do,
+/// whichever is more; also measured.
 const MIN_PATH: f64 = 4.0;
 const MAX_OVER_ARCS: f64 = 1.5;
 /// Maximum number of steps in an interval between two breaks of a motion.

@@ -1,5 +1,5 @@
-//! Depths of voxels inside the volume. Facets may extend into the volume, as they are clipped only coarsely: points of them that are not open
-//! do not count as surface.
+//! Depths of voxels inside the volume. Facets may extend into the volume, as they are clipped only coarsely: points of them that are not
+//! open do not count as surface.
 
 use std::borrow::Cow;
 use std::cell::RefCell;

@@ -17,9 +17,9 @@
 //!
 //! Far from the mesh Gamma and phi are clamped, each at its band, and their difference means little: if it were given everywhere along the
 //! rim (the border of the reach), it would distort the result at flagged nodes (between two balls by 0.1 to 0.3 at a reach of 8, by 0.02 at
-//! most with these rules). It is needed where phi alone would change a sign: without it, a drop of phi that lies across the rim would be cut
-//! in two. As a last resort a free node beside one beyond reach keeps its Gamma if its sign would change. So no edge of the grid across the
-//! rim gains or loses a crossing.
+//! most with these rules). It is needed where phi alone would change a sign: without it, a drop of phi that lies across the rim would be
+//! cut in two. As a last resort a free node beside one beyond reach keeps its Gamma if its sign would change. So no edge of the grid across
+//! the rim gains or loses a crossing.
 
 pub(in crate::surface) mod nodes;
 mod solve;

@@ -12,8 +12,8 @@ use crate::error::Result;
 /// Sentinel: no node.
 pub const NONE: u32 = u32::MAX;
 
-/// The equation of a free node: its psi times the count of nodes that it depends on, minus the sum of psi of the free ones among them, equals
-/// the load.
+/// The equation of a free node: its psi times the count of nodes that it depends on, minus the sum of psi of the free ones among them,
+/// equals the load.
 #[derive(Debug, Clone, Copy)]
 pub struct Row {
     /// The free nodes before and behind it on x, y and z, as indices of rows; [`NONE`]: there is none.
@@ -89,8 +89,8 @@ impl System {
         2.0 / (1.0 + libm::sin(std::f64::consts::PI / (f64::from(self.widest) + 1.0)))
     }
 
-    /// Solves by successive over-relaxation (Eq. 2.5) with a factor `omega` until no psi changes by `tolerance` (cells), or for `max_iterations`
-    /// iterations.
+    /// Solves by successive over-relaxation (Eq. 2.5) with a factor `omega` until no psi changes by `tolerance` (cells), or for
+    /// `max_iterations` iterations.
     ///
     /// # Errors
     /// Cancel.
