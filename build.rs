@@ -4,13 +4,13 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Sources, those of a group compiled as one: each compilation reads OpenVDB's headers and makes the functions of its trees
-/// anew, which takes longer than most of our own. Two groups of about the same time, for two cores; what a group's sources
-/// call their own (`namespace {`) needs different names.
+/// Sources; each group is one translation unit, because parsing OpenVDB's headers and instantiating its trees takes longer
+/// than most of our own code. Two groups that take about the same time, for two cores. The sources of a group share their
+/// anonymous namespaces, so names in these must differ.
 const SOURCES: [&[&str]; 2] =
     [&["grid.cc", "parts.cc", "csg.cc", "filters.cc", "particles.cc"], &["meshing.cc", "points.cc"]];
 
-/// Take the functions of OpenVDB's trees from its library.
+/// The macro with which the functions of OpenVDB's trees come from its library and are not instantiated here.
 const TREES: &str = "FRAZIL_TREES_OF_LIBRARY";
 
 fn main() {
@@ -48,13 +48,13 @@ fn main() {
     let out = PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo sets it"));
     let archive = out.join(format!("lib{ARCHIVE}.a"));
     let of_library = library(&roots).and_then(|library| symbols(&["-D", "--defined-only"], &library));
-    let compiled = of_library.is_some_and(|mut there| {
+    let is_compiled = of_library.is_some_and(|mut defined| {
         compile(&roots, &out, Some(TREES));
-        there.extend(symbols(&["--defined-only"], &archive).unwrap_or_default());
-        // Another distribution's library may lack some.
-        symbols(&["--undefined-only"], &archive).is_some_and(|needed| needed.is_subset(&there))
+        defined.extend(symbols(&["--defined-only"], &archive).unwrap_or_default());
+        // A library of another distribution may lack some symbols.
+        symbols(&["--undefined-only"], &archive).is_some_and(|needed| needed.is_subset(&defined))
     });
-    if !compiled {
+    if !is_compiled {
         compile(&roots, &out, None);
     }
     compile_loops(&roots, &out);
@@ -62,16 +62,16 @@ fn main() {
     println!("cargo:rustc-link-lib=tbb");
 }
 
-/// Sources with loops of their own over voxels and places, compiled for speed, with trees of their own: those of the library
-/// write files a tenth slower.
+/// Sources with loops over voxels and positions, compiled for speed, with their own instances of OpenVDB's trees: the
+/// library's write files a tenth slower.
 const LOOPS: [&str; 2] = ["file.cc", "sample.cc"];
-/// Name of what is linked into the crate.
+/// Name of the static library of [`SOURCES`].
 const ARCHIVE: &str = "frazil_openvdb";
 
 /// Compiles the sources, with a macro defined.
 fn compile(roots: &[PathBuf], out: &Path, defined: Option<&str>) {
     let mut build = cxx_build::bridge("src/vdb/bridge.rs");
-    // Half the time of 3, and no slower where what takes long is in OpenVDB's library.
+    // Compiles in half the time of level 3, and runs as fast where the time is spent in OpenVDB's library.
     configure(&mut build, roots).opt_level(1);
     defined.iter().for_each(|name| {
         build.define(name, None);
@@ -98,7 +98,7 @@ fn joined(out: &Path, sources: &[&str]) -> PathBuf {
     path
 }
 
-/// What all sources are compiled with.
+/// Sets the options that all sources share.
 fn configure<'b>(build: &'b mut cc::Build, roots: &[PathBuf]) -> &'b mut cc::Build {
     build
         .std("c++17")
@@ -128,7 +128,7 @@ fn symbols(options: &[&str], file: &Path) -> Option<HashSet<String>> {
         Command::new("nm").args(options).arg(file).output().ok().filter(|listed| listed.status.success())?;
     let text = String::from_utf8(listed.stdout).ok()?;
     let names = text.lines().filter_map(|line| line.split_whitespace().last());
-    // Ours name OpenVDB's types too.
+    // Symbols of this crate may have OpenVDB's types in their names.
     Some(
         names
             .filter(|name| name.contains("openvdb") && !name.contains("frazil"))

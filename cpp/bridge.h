@@ -1,4 +1,4 @@
-// Our C++ classes and functions as Rust sees them; no OpenVDB header here.
+// The C++ classes and functions that Rust sees; no OpenVDB header here.
 #pragma once
 
 #include "rust/cxx.h"
@@ -55,7 +55,7 @@ public:
     std::unique_ptr<Ready> ready;
 };
 
-/// A grid of points, each with its place and attributes.
+/// A grid of points, each with its position and attributes.
 class PointGrid {
 public:
     struct Impl;
@@ -93,7 +93,7 @@ std::unique_ptr<VectorGrid> make_vector_grid(double voxel, std::array<float, 3> 
 float background(const Grid& grid) noexcept;
 std::array<float, 3> vector_background(const VectorGrid& grid) noexcept;
 
-// Of both kinds of grid.
+// For both kinds of grid.
 template <typename G>
 std::unique_ptr<G> copy_grid(const G& grid);
 template <typename G>

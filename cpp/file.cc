@@ -74,7 +74,7 @@ protected:
 
     std::streamsize xsputn(const char* bytes, std::streamsize count) override {
         const size_t length = static_cast<size_t>(count);
-        // Sizes and offsets are filled in afterwards: what lies there is written over.
+        // Sizes and offsets are filled in later, over existing bytes.
         const size_t over = std::min(length, data_.size() - at_);
         data_.replace(at_, over, bytes, length);
         at_ += length;
@@ -88,9 +88,9 @@ protected:
     }
 
     pos_type seekpos(pos_type to, std::ios_base::openmode) override {
-        const off_type place = to;
-        if (place < 0 || static_cast<size_t>(place) > data_.size()) return pos_type(off_type(-1));
-        at_ = static_cast<size_t>(place);
+        const off_type position = to;
+        if (position < 0 || static_cast<size_t>(position) > data_.size()) return pos_type(off_type(-1));
+        at_ = static_cast<size_t>(position);
         return to;
     }
 
@@ -106,7 +106,7 @@ void open(openvdb::io::File& file) {
     file.open(/*delayLoad=*/false);
 }
 
-/// A grid of a kind, without what its file says of itself.
+/// A grid of a type, without the statistics that its file states.
 template <typename GridType>
 auto loaded(const openvdb::GridBase::Ptr& base) {
     auto grid = openvdb::gridPtrCast<GridType>(base);
@@ -122,7 +122,7 @@ auto loaded(const openvdb::GridBase::Ptr& base) {
     return wrap(grid);
 }
 
-/// Nothing for grids of other types.
+/// Empty for grids of other types.
 Found found(const openvdb::GridBase::Ptr& base) {
     Found out;
     if (base->isType<openvdb::FloatGrid>()) out.floats = loaded<openvdb::FloatGrid>(base);
@@ -131,7 +131,7 @@ Found found(const openvdb::GridBase::Ptr& base) {
     return out;
 }
 
-/// Bytes that somebody else holds, to read.
+/// Reads bytes that the caller holds.
 class View : public std::streambuf {
 public:
     explicit View(rust::Slice<const uint8_t> bytes) {
@@ -149,9 +149,9 @@ protected:
     }
 
     pos_type seekpos(pos_type to, std::ios_base::openmode) override {
-        const off_type place = to;
-        if (place < 0 || place > egptr() - eback()) return pos_type(off_type(-1));
-        setg(eback(), eback() + place, egptr());
+        const off_type position = to;
+        if (position < 0 || position > egptr() - eback()) return pos_type(off_type(-1));
+        setg(eback(), eback() + position, egptr());
         return to;
     }
 };
@@ -161,7 +161,7 @@ openvdb::GridPtrVecPtr streamed(rust::Slice<const uint8_t> bytes) {
     initialise();
     View view(bytes);
     std::istream in(&view);
-    // Bytes that are cut short end the reading at once: OpenVDB would unpack what was never read.
+    // Truncated bytes must end the reading at once: OpenVDB would decompress data that was never read.
     in.exceptions(std::ios_base::failbit | std::ios_base::badbit);
     return openvdb::io::Stream(in, /*delayLoad=*/false).getGrids();
 }
@@ -212,7 +212,7 @@ Stored::~Stored() {
 
 namespace {
 
-/// The bytes of a file, with the room that it is expected to take.
+/// The bytes of a file, of which about `expected` are reserved first.
 std::unique_ptr<std::string> written(const openvdb::GridCPtrVec& list, size_t expected, int32_t compression,
                                      const openvdb::MetaMap& map) {
     constexpr uint32_t schemes[] = {openvdb::io::COMPRESS_NONE, openvdb::io::COMPRESS_ZIP, openvdb::io::COMPRESS_BLOSC};
@@ -225,7 +225,7 @@ std::unique_ptr<std::string> written(const openvdb::GridCPtrVec& list, size_t ex
     return bytes.take();
 }
 
-/// Numbers from here on are rounded to infinity in 16 bits.
+/// From this magnitude on, numbers are rounded to infinity in 16 bits.
 constexpr float OVER_HALF = 65520.0f;
 
 bool fits_half(float value) { return std::abs(value) < OVER_HALF; }
@@ -265,7 +265,7 @@ std::unique_ptr<std::string> grids_to_bytes(rust::Slice<const size_t> grids, rus
     for (const auto& entry : meta) map.insertMeta(std::string(entry.key), *from_meta(entry));
     return here([&] {
         openvdb::GridCPtrVec list;
-        // A packed leaf of a level set takes some 370 bytes, a plain one 900: growing in steps would copy them all.
+        // A compressed leaf of a level set takes some 370 bytes, a plain one 900: growing in steps would copy them all.
         const size_t bytes_per_leaf = compression == 2 ? 400 : 1000;
         size_t leaves = 64;
         const auto add = [&](const auto& source, size_t values) {
@@ -293,7 +293,7 @@ std::unique_ptr<std::string> points_to_bytes(const PointGrid& grid, int32_t comp
     return here([&] {
         // A shallow copy carries its own metadata: statistics stay out of the caller's grid.
         const auto copy = points_of(grid)->copyGrid();
-        // Snow grains take some 45 bytes each packed, and stand some 200 to a leaf.
+        // Compressed snow grains take some 45 bytes each, and a leaf has some 200.
         const size_t expected = (copy->baseTree().leafCount() + 1) * 10000;
         return written({copy}, expected, compression, map);
     });

@@ -1,4 +1,4 @@
-// Tools that move or mend a whole level set.
+// Tools that move or renormalise a whole level set.
 #include "impl.h"
 
 #include <openvdb/tools/GridOperators.h>
@@ -13,7 +13,7 @@ namespace {
 
 using Filter = openvdb::tools::LevelSetFilter<openvdb::FloatGrid, openvdb::FloatGrid, openvdb::util::NullInterrupter>;
 
-/// A filter with OpenVDB's defaults (fifth-order WENO), or with one first-order pass: ten times cheaper.
+/// Configures a filter with OpenVDB's defaults (fifth-order WENO), or with one first-order pass, which is much cheaper.
 void configure(Filter& filter, bool weno) {
     if (weno) return;
     filter.setSpatialScheme(openvdb::math::FIRST_BIAS);
@@ -21,8 +21,8 @@ void configure(Filter& filter, bool weno) {
     filter.setNormCount(1);
 }
 
-/// The field and the interrupter for which OpenVDB's library has the advection: another field compiles it anew, which
-/// takes a minute.
+/// The field and the interrupter for which OpenVDB's library instantiates the advection: any other field would compile
+/// it here, which takes a minute.
 using Field = openvdb::tools::DiscreteField<openvdb::Vec3SGrid, openvdb::tools::BoxSampler>;
 using Advection = openvdb::tools::LevelSetAdvection<openvdb::FloatGrid, Field, openvdb::util::NullInterrupter>;
 
@@ -38,7 +38,7 @@ openvdb::Vec3SGrid::Ptr outward(const openvdb::FloatGrid& level_set, const openv
     return velocity;
 }
 
-/// Runs a tool on a copy, put in the grid's place when it is done: a cancel or an error changes nothing.
+/// Runs a tool on a copy that replaces the grid at the end, so that a cancel or an error changes nothing.
 template <typename Work>
 void on_copy(Grid& grid, const Call& call, Work&& work) {
     run(call, [&] {

@@ -1,4 +1,4 @@
-// Grids: making, looking into, and changing leaves in bulk.
+// Grids: creation, access, and bulk changes of leaves.
 #include "impl.h"
 
 #include <openvdb/tools/LevelSetUtil.h>
@@ -21,7 +21,7 @@ static_assert(Leaf::SIZE == 512 && sizeof(Leaf::NodeMaskType) == 64, "a leaf is 
 static_assert(VectorLeaf::SIZE == 512 && sizeof(VectorLeaf::NodeMaskType) == 64, "a leaf of vectors is as large");
 static_assert(sizeof(openvdb::Vec3s) == 3 * sizeof(float), "vectors are packed");
 
-// OpenVDB takes trees down in parallel.
+// OpenVDB would destroy trees in parallel, on workers of its own.
 Grid::Grid(std::unique_ptr<Impl> impl) : impl(std::move(impl)) {}
 Grid::~Grid() {
     if (impl) here([&] { impl.reset(); });
@@ -37,7 +37,7 @@ void initialise() {
 }
 
 void end_workers() noexcept {
-    // Refused while another part of the process works with TBB: its threads are then left to it.
+    // Fails while another part of the process uses TBB, which then keeps its threads.
     tbb::task_scheduler_handle handle{tbb::attach{}};
     tbb::finalize(handle, std::nothrow);
 }
@@ -142,7 +142,7 @@ uint64_t memory_bytes(const G& grid) noexcept {
 
 template <typename G>
 uint64_t file_bound(const G& grid) noexcept {
-    // What a file holds of a leaf and of the nodes above it, none of it packed, with room for the codec's own words.
+    // Uncompressed sizes in a file of a leaf and of the nodes above it, with a margin for the codec's own data.
     const auto counts = here([&] { return grid.impl->grid->tree().nodeCount(); });
     constexpr uint64_t value = sizeof(grid.impl->grid->background());
     constexpr uint64_t leaf = 512 * value + 3 * 64 + 64;
@@ -226,15 +226,15 @@ FRAZIL_FUNCTIONS_OF(Grid);
 FRAZIL_FUNCTIONS_OF(VectorGrid);
 #undef FRAZIL_FUNCTIONS_OF
 
-/// Leaves and tiles of a kind of tree, outside of any tree.
+/// Leaves and tiles of a type of tree, outside any tree.
 template <typename Tree>
 struct Parts {
     std::vector<openvdb::Coord> origins;
-    /// A leaf, or none where the constant counts.
+    /// Null where the constant applies.
     std::vector<std::unique_ptr<typename Tree::LeafNodeType>> leaves;
     std::vector<typename Tree::ValueType> constants;
 
-    void fill(const Call& call, rust::Slice<const int32_t> places, rust::Slice<const size_t> values,
+    void fill(const Call& call, rust::Slice<const int32_t> positions, rust::Slice<const size_t> values,
               rust::Slice<const size_t> masks) {
         using Node = typename Tree::LeafNodeType;
         const size_t count = values.size();
@@ -243,7 +243,7 @@ struct Parts {
         run(call, [&] {
             tbb::parallel_for(tbb::blocked_range<size_t>(0, count), [&](const tbb::blocked_range<size_t>& range) {
                 for (size_t i = range.begin(); i != range.end(); ++i) {
-                    const openvdb::Coord at(places[3 * i], places[3 * i + 1], places[3 * i + 2]);
+                    const openvdb::Coord at(positions[3 * i], positions[3 * i + 1], positions[3 * i + 2]);
                     origins[i] = at;
                     if (values[i] == 0) continue;
                     auto leaf = std::make_unique<Node>(at, typename Tree::ValueType(0.0f), false);

@@ -1,4 +1,4 @@
-// What our sources share: the hidden grid, and how a call runs.
+// Shared by all sources: the grids behind the classes of the bridge, and the execution of calls.
 #pragma once
 
 #include "bridge.h"
@@ -15,8 +15,8 @@
 #include <stdexcept>
 
 #ifdef FRAZIL_TREES_OF_LIBRARY
-// OpenVDB's library has these; making their functions anew in each of our objects takes most of a build. build.rs looks
-// whether the library has all that is then needed.
+// OpenVDB's library has these instances; repeating them in each of our objects takes most of a build. build.rs checks
+// that the library has all symbols that are then needed.
 #define FRAZIL_IN_LIBRARY(...)                                                                        \
     extern template class openvdb::tree::Tree<openvdb::tree::Tree4<__VA_ARGS__>::Type::RootNodeType>; \
     extern template class openvdb::Grid<openvdb::tree::Tree4<__VA_ARGS__>::Type>;
@@ -40,15 +40,15 @@ struct VectorImpl {
 /// Registers OpenVDB's types once.
 void initialise();
 
-/// A grid of ours around a grid that nobody else holds.
+/// Wraps a grid that nobody else holds.
 std::unique_ptr<Grid> wrap(openvdb::FloatGrid::Ptr grid);
 std::unique_ptr<VectorGrid> wrap(openvdb::Vec3SGrid::Ptr grid);
 
-/// The same of points; none when the grid is of another type.
+/// As `wrap`, for points; null if the grid is of another type.
 std::unique_ptr<PointGrid> wrap_points(openvdb::GridBase::Ptr grid);
 openvdb::GridBase::Ptr points_of(const PointGrid& grid);
 
-/// A value as the bridge carries it: of a float the first number counts.
+/// A value as the bridge passes it; a float is the first number.
 inline std::array<float, 3> triple(float value) { return {value, 0.0f, 0.0f}; }
 inline std::array<float, 3> triple(const openvdb::Vec3s& value) { return {value[0], value[1], value[2]}; }
 
@@ -57,7 +57,7 @@ struct Cancelled : std::runtime_error {
     Cancelled() : std::runtime_error("frazil: cancelled") {}
 };
 
-/// Stops OpenVDB's tools when the call is cancelled; the flag stays up until the call has ended.
+/// Stops OpenVDB's tools when the call is cancelled; the flag stays set until the call has ended.
 class Interrupter : public openvdb::util::NullInterrupter {
 public:
     explicit Interrupter(const Call& call) : flag_(reinterpret_cast<const volatile bool*>(call.cancel)) {}
@@ -70,8 +70,8 @@ private:
     const volatile bool* flag_;
 };
 
-/// Runs what has no call with threads of its own on this thread alone: outside of an arena TBB would start workers, as
-/// many as there are cores, for a host that asked for none.
+/// Runs work that has no call on this thread alone: outside an arena TBB would start one worker per core, although the
+/// host asked for none.
 template <typename Work>
 auto here(Work&& work) {
     tbb::task_arena arena(1);

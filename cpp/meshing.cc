@@ -1,4 +1,4 @@
-// Between meshes and level sets.
+// Conversion between meshes and level sets.
 #include "impl.h"
 
 #include <openvdb/math/Stencils.h>
@@ -14,7 +14,7 @@
 
 #ifdef FRAZIL_TREES_OF_LIBRARY
 extern template void openvdb::tools::VolumeToMesh::operator()(const openvdb::FloatGrid&);
-// What `meshToVolume` works with; the library has all of it but this function.
+// The tree that `meshToVolume` uses: the library instantiates all of it except this function.
 using Signs = openvdb::tree::Tree<openvdb::tree::Tree4<unsigned char>::Type::RootNodeType>;
 extern template class openvdb::tree::Tree<Signs::RootNodeType>;
 template void Signs::releaseAllAccessors();
@@ -24,7 +24,7 @@ namespace frazil {
 
 namespace {
 
-/// Triangles in index space, as meshToVolume asks for them.
+/// Triangles in index space, with the interface that meshToVolume requires.
 struct IndexMesh {
     rust::Slice<const float> points;
     rust::Slice<const uint32_t> indices;
@@ -62,7 +62,7 @@ Wanted wanted_of(const openvdb::FloatGrid& grid, const Part& part) {
         out.blocks.push_back(origin);
     }
     openvdb::CoordBBox box(part.low[0], part.low[1], part.low[2], part.high[0], part.high[1], part.high[2]);
-    // No farther than the grid reaches: a box may be as large as it likes.
+    // Clipped to the grid's extent, because a box may be arbitrarily large.
     openvdb::CoordBBox reach = grid.evalActiveVoxelBoundingBox();
     if (reach.empty() || !part.origins.empty()) return out;
     reach.expand(LEAF);
@@ -75,8 +75,8 @@ Wanted wanted_of(const openvdb::FloatGrid& grid, const Part& part) {
     return out;
 }
 
-/// Some blocks of a grid and those around them: all that a mesh of their voxels depends on.
-openvdb::FloatGrid::Ptr around(const openvdb::FloatGrid& grid, const std::vector<openvdb::Coord>& blocks) {
+/// Some blocks of a grid and their neighbours: all that a mesh of the blocks' voxels depends on.
+openvdb::FloatGrid::Ptr with_neighbours(const openvdb::FloatGrid& grid, const std::vector<openvdb::Coord>& blocks) {
     const auto out = openvdb::FloatGrid::create(grid.background());
     out->setTransform(grid.transform().copy());
     out->setGridClass(grid.getGridClass());
@@ -121,9 +121,9 @@ Triangles to_mesh(const Grid& grid, const Call& call, double iso, double adaptiv
         } else {
             const Wanted wanted = wanted_of(whole, part);
             mesher.setSurfaceMask(wanted.mask);
-            mesher(*around(whole, wanted.blocks));
+            mesher(*with_neighbours(whole, wanted.blocks));
         }
-        // A transform that mirrors turns the polygons round.
+        // A mirroring transform reverses the polygons.
         const bool mirrored = whole.transform().baseMap()->determinant() < 0.0;
         Interrupter(call).check();
         Triangles out;
@@ -154,8 +154,9 @@ Triangles to_mesh(const Grid& grid, const Call& call, double iso, double adaptiv
     });
 }
 
-// OpenVDB's LevelSetMeasure multiplies gradients by voxels' own indices, whose rounding and discretisation a grid far
-// from the origin multiplies too, and refuses grids without voxels. Here indices count from the grid's middle.
+// OpenVDB's LevelSetMeasure multiplies gradients by voxel indices, which amplifies errors of rounding and
+// discretisation in a grid far from the origin, and it refuses grids without voxels. Here indices are relative to the
+// grid's centre.
 void measure(const Grid& grid, const Call& call, double& area, double& volume) {
     run(call, [&] {
         using Gradient = openvdb::math::GradStencil<openvdb::FloatGrid, false>;

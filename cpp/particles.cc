@@ -1,4 +1,4 @@
-// From particles to level sets.
+// Level sets from particles.
 #include "impl.h"
 
 #include <openvdb/tools/Composite.h>
@@ -14,9 +14,9 @@ namespace frazil {
 
 namespace {
 
-/// Largest sphere (voxels) that the particle tool gets: it fills the inside voxel by voxel, which takes time and memory
-/// that grow with the volume.
-constexpr double LARGEST_FILLED = 100.0;
+/// Maximum radius (voxels) of spheres for OpenVDB's particle tool, which fills the inside voxel by voxel: its time and
+/// memory grow with the volume.
+constexpr double MAX_FILLED_RADIUS = 100.0;
 
 /// A sphere, in metres or in voxels.
 struct Sphere {
@@ -24,7 +24,7 @@ struct Sphere {
     openvdb::Real radius;
 };
 
-/// Spheres as the particle tool asks for them.
+/// Spheres, with the interface that the particle tool requires.
 struct Spheres {
     using PosType = openvdb::Vec3R;
 
@@ -40,7 +40,7 @@ struct Spheres {
 
 using Tree = openvdb::FloatTree;
 
-/// Puts the part of a sphere's narrow band into a tree that lies in the plane x of voxels.
+/// Adds the voxels of a sphere's narrow band with the index x to a tree.
 void add_plane(Tree& tree, const Sphere& sphere, int x, double voxel, double half_width) {
     const openvdb::Vec3R& c = sphere.centre;
     const double outer = std::pow(sphere.radius + half_width, 2), inner = std::pow(sphere.radius - half_width, 2);
@@ -62,7 +62,7 @@ void add_plane(Tree& tree, const Sphere& sphere, int x, double voxel, double hal
         if (xy2 >= inner) {
             add(y, xy2, c[2] - top, c[2] + top);
         } else {
-            // Ranges that meet would write the same values twice: no harm.
+            // Ranges that meet only write the same values twice.
             const double bottom = std::sqrt(inner - xy2);
             add(y, xy2, c[2] - top, c[2] - bottom);
             add(y, xy2, c[2] + bottom, c[2] + top);
@@ -108,7 +108,7 @@ std::unique_ptr<Grid> from_particles(const Call& call, rust::Slice<const double>
         for (size_t n = 0; n < radii.size(); ++n) {
             const openvdb::Vec3R centre(positions[3 * n], positions[3 * n + 1], positions[3 * n + 2]);
             const double radius = radii[n], voxels = radius / voxel;
-            if (voxels > LARGEST_FILLED) {
+            if (voxels > MAX_FILLED_RADIUS) {
                 large.push_back({centre / voxel, voxels});
             } else {
                 small.list.push_back({centre, radius});
@@ -116,8 +116,8 @@ std::unique_ptr<Grid> from_particles(const Call& call, rust::Slice<const double>
         }
         openvdb::tools::ParticlesToLevelSet<openvdb::FloatGrid, void, openvdb::util::NullInterrupter> raster(
             *grid, &interrupter);
-        // What the grid cannot hold is left out, as the tool's lower limit has it; its upper one is none of ours.
-        raster.setRmax(2.0 * LARGEST_FILLED);
+        // The tool's lower limit omits what the grid cannot resolve; its upper limit must omit nothing.
+        raster.setRmax(2.0 * MAX_FILLED_RADIUS);
         raster.rasterizeSpheres(small);
         interrupter.check();
         raster.finalize(large.empty());

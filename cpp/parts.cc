@@ -1,4 +1,4 @@
-// What a grid consists of besides its leaves, taken apart and put together again.
+// The parts of a grid other than its leaves: transform, metadata and tiles, taken out and assembled again.
 #include "impl.h"
 
 #include <openvdb/io/io.h>
@@ -13,8 +13,8 @@ namespace {
 
 /// A grid without leaves.
 template <typename GridType>
-typename GridType::Ptr put_together(rust::Slice<const uint8_t> head, const typename GridType::ValueType& background,
-                                    rust::Slice<const Tile> tiles) {
+typename GridType::Ptr without_leaves(rust::Slice<const uint8_t> head, const typename GridType::ValueType& background,
+                                      rust::Slice<const Tile> tiles) {
     initialise();
     std::istringstream in(std::string(reinterpret_cast<const char*>(head.data()), head.size()));
     in.exceptions(std::ios_base::failbit | std::ios_base::badbit);
@@ -53,7 +53,7 @@ rust::Vec<Tile> tiles(const G& grid) {
     tile.setMaxDepth(Values::LEAF_DEPTH - 1);
     for (; tile; ++tile) {
         const bool active = tile.isValueOn();
-        // What its place says without it.
+        // Implied by the background.
         if (!active && *tile == tree.background()) continue;
         const auto at = tile.getCoord();
         out.push_back({at[0], at[1], at[2], static_cast<uint32_t>(tile.getLevel()), active, triple(*tile)});
@@ -67,12 +67,13 @@ template rust::Vec<Tile> tiles(const Grid&);
 template rust::Vec<Tile> tiles(const VectorGrid&);
 
 std::unique_ptr<Grid> assemble(rust::Slice<const uint8_t> head, float background, rust::Slice<const Tile> tiles) {
-    return here([&] { return wrap(put_together<openvdb::FloatGrid>(head, background, tiles)); });
+    return here([&] { return wrap(without_leaves<openvdb::FloatGrid>(head, background, tiles)); });
 }
 
 std::unique_ptr<VectorGrid> assemble_vectors(rust::Slice<const uint8_t> head, std::array<float, 3> background,
                                              rust::Slice<const Tile> tiles) {
-    return here([&] { return wrap(put_together<openvdb::Vec3SGrid>(head, openvdb::Vec3s(background.data()), tiles)); });
+    return here(
+        [&] { return wrap(without_leaves<openvdb::Vec3SGrid>(head, openvdb::Vec3s(background.data()), tiles)); });
 }
 
 }  // namespace frazil

@@ -20,11 +20,11 @@ using openvdb::points::AttributeSet;
 using PointTree = openvdb::points::PointDataTree;
 using PointLeaf = PointTree::LeafNodeType;
 
-/// The types of attributes that the Rust side holds, in the order of its numbers.
+/// The types of attributes on the Rust side, in the order of its numbers.
 enum PointKind : int32_t { POINT_FLOAT, POINT_INT32, POINT_INT64, POINT_BOOL, POINT_VEC3, POINT_KINDS };
 constexpr const char* POINT_TYPES[POINT_KINDS] = {"float", "int32", "int64", "bool", "vec3s"};
 
-/// Calls `work` with a value of the type of a kind; the Rust side holds a bool in a byte.
+/// Calls `work` with a value of the type of a kind.
 template <typename Work>
 void with_type(int32_t kind, Work&& work) {
     switch (kind) {
@@ -48,7 +48,7 @@ void with_type(int32_t kind, Work&& work) {
     }
 }
 
-/// How the Rust side holds a value.
+/// The type in which the Rust side stores a value: a bool takes a byte.
 template <typename T>
 using Held = std::conditional_t<std::is_same_v<T, bool>, uint8_t, T>;
 
@@ -87,7 +87,7 @@ struct PointLeaves {
     }
 };
 
-/// An attribute of a leaf; a file may have leaves that disagree about what they hold.
+/// An attribute of a leaf; in a damaged file the leaves may have different attributes.
 const AttributeArray& array_of(const PointLeaf& leaf, const std::string& name) {
     const AttributeArray* array = leaf.attributeSet().getConst(name);
     if (array == nullptr) throw std::runtime_error("leaves of points that differ in their attributes");
@@ -96,8 +96,7 @@ const AttributeArray& array_of(const PointLeaf& leaf, const std::string& name) {
     return *array;
 }
 
-/// Copies values, decoded, to where the Rust side holds them; 1 when the array is uniform and `once` asks for that
-/// value.
+/// Copies `count` values, decoded, to the memory of the Rust side; the value of a uniform array is repeated.
 template <typename T>
 void copy_values(const AttributeArray& array, size_t count, Held<T>* out) {
     using Plain = openvdb::points::TypedAttributeArray<T>;
@@ -114,14 +113,14 @@ void copy_values(const AttributeArray& array, size_t count, Held<T>* out) {
     for (size_t i = 0; i < count; ++i) out[i] = static_cast<Held<T>>(values.get(static_cast<openvdb::Index>(i)));
 }
 
-/// Gives an array of a leaf its values: the points `order[begin + i]`, or without an order `begin + i`.
+/// Sets the values of an array of a leaf: those of the points `order[begin + i]`, or `begin + i` without an order.
 template <typename T>
 void set_values(AttributeArray& array, const PointArray& from, size_t begin, size_t count, const uint32_t* order) {
     using Plain = openvdb::points::TypedAttributeArray<T>;
     auto& typed = Plain::cast(array);
     const auto* values = reinterpret_cast<const Held<T>*>(from.address);
     if (from.uniform) {
-        // An array is made uniform; expanding it is what makes it take one value a point.
+        // Arrays start uniform; only `expand` makes room for one value per point.
         typed.setUnsafe(0, static_cast<T>(values[0]));
         return;
     }
@@ -161,7 +160,7 @@ std::unique_ptr<PointGrid> make_points(const Call& call, double voxel, rust::Str
             descriptor = descriptor ? descriptor->duplicateAppend(Name(array.name), type)
                                     : AttributeSet::Descriptor::create(type);
         }
-        const uint32_t* picked = order.empty() ? nullptr : order.data();
+        const uint32_t* indices = order.empty() ? nullptr : order.data();
         const size_t count = cells.size() / 3;
         std::vector<std::unique_ptr<PointLeaf>> leaves(starts.size());
         const AttributeArray::ScopedRegistryLock lock;
@@ -170,14 +169,14 @@ std::unique_ptr<PointGrid> make_points(const Call& call, double voxel, rust::Str
             interrupter.check();
             const size_t begin = starts[n], end = n + 1 < starts.size() ? starts[n + 1] : count;
             const auto cell = [&](size_t at) {
-                const int32_t* c = cells.data() + 3 * (picked == nullptr ? at : picked[at]);
+                const int32_t* c = cells.data() + 3 * (indices == nullptr ? at : indices[at]);
                 return openvdb::Coord(c[0], c[1], c[2]);
             };
             auto leaf = std::make_unique<PointLeaf>(cell(begin) & ~7);
             auto set = std::make_unique<AttributeSet>(descriptor, static_cast<openvdb::Index>(end - begin), &lock);
             for (size_t i = 0; i < arrays.size(); ++i) {
                 with_type(arrays[i].kind, [&](auto value) {
-                    set_values<decltype(value)>(*set->get(i), arrays[i], begin, end - begin, picked);
+                    set_values<decltype(value)>(*set->get(i), arrays[i], begin, end - begin, indices);
                 });
             }
             // Each voxel's value is where its points end in the arrays.
@@ -249,10 +248,10 @@ PointsHead points_head(const PointGrid& grid, const Call& call) {
                 copy_values<T>(array, 1, &expected);
                 for (const auto* leaf : leaves.list) {
                     const AttributeArray& other = array_of(*leaf, name);
-                    Held<T> there;
-                    if (attribute.uniform && other.isUniform()) copy_values<T>(other, 1, &there);
+                    Held<T> own;
+                    if (attribute.uniform && other.isUniform()) copy_values<T>(other, 1, &own);
                     attribute.uniform =
-                        attribute.uniform && other.isUniform() && std::memcmp(&expected, &there, sizeof there) == 0;
+                        attribute.uniform && other.isUniform() && std::memcmp(&expected, &own, sizeof own) == 0;
                 }
             });
         }
@@ -263,7 +262,7 @@ PointsHead points_head(const PointGrid& grid, const Call& call) {
 
 void point_cells(const PointGrid& grid, const Call& call, rust::Slice<int32_t> out) {
     const PointLeaves leaves(*grid.impl->grid);
-    if (out.size() != 3 * leaves.count) throw std::invalid_argument("places for another number of points");
+    if (out.size() != 3 * leaves.count) throw std::invalid_argument("cells for another number of points");
     leaves.each(call, [&](size_t n) {
         const PointLeaf& leaf = *leaves.list[n];
         int32_t* at = out.data() + 3 * leaves.starts[n];

@@ -1,4 +1,4 @@
-// Values of grids at places.
+// Values of grids at positions.
 #include "impl.h"
 
 #include <openvdb/tools/Interpolation.h>
@@ -9,7 +9,7 @@ namespace frazil {
 
 namespace {
 
-/// Calls `one` for each of so many world positions, with the tree, the place in index space and its number.
+/// Calls `one` for each world position with an accessor, the position in index space and its index.
 template <typename Source, typename One>
 void at_each(const Source& source, const Call& call, rust::Slice<const double> world, One&& one) {
     run(call, [&] {
@@ -19,8 +19,8 @@ void at_each(const Source& source, const Call& call, rust::Slice<const double> w
                               if (interrupter.wasInterrupted()) return;
                               auto tree = source.getConstAccessor();
                               for (size_t i = range.begin(); i != range.end(); ++i) {
-                                  const openvdb::Vec3d place(world[3 * i], world[3 * i + 1], world[3 * i + 2]);
-                                  one(tree, source.worldToIndex(place), i);
+                                  const openvdb::Vec3d position(world[3 * i], world[3 * i + 1], world[3 * i + 2]);
+                                  one(tree, source.worldToIndex(position), i);
                               }
                           });
         interrupter.check();

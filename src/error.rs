@@ -53,7 +53,7 @@ pub enum Error {
     /// OpenVDB refused for a reason that no other kind covers.
     #[error("{0}")]
     OpenVdb(String),
-    /// A promise inside the library does not hold: a bug of ours.
+    /// An invariant of the library does not hold: a bug.
     #[error("internal error: {0}")]
     Internal(String),
 }
@@ -99,34 +99,34 @@ impl Error {
     }
 }
 
-/// Fails if something is wrong, with an error that is made only then.
+/// Fails if `is_wrong`; only then is the error made.
 ///
 /// # Errors
-/// That one.
+/// `error`.
 pub fn fail_if<E>(is_wrong: bool, error: impl FnOnce() -> E) -> std::result::Result<(), E> {
     if is_wrong { Err(error()) } else { Ok(()) }
 }
 
-/// Letters of a text from outside that a message repeats.
-const LONGEST: usize = 400;
+/// Maximum characters of an untrusted text in a message.
+const MAX_CHARACTERS: usize = 400;
 
-/// A text from outside on one line, cut when it is long, that a terminal shows as it is.
+/// An untrusted text on one line, truncated, without control characters.
 pub fn one_line(text: &str) -> String {
-    let cut: String = text.chars().take(LONGEST).collect();
+    let cut: String = text.chars().take(MAX_CHARACTERS).collect();
     visible(&cut).split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// A text that a terminal shows as it is: other control characters than line ends become spaces.
+/// A text whose control characters, except line ends, are replaced by spaces.
 pub fn visible(text: &str) -> String {
-    let letter = |letter: char| if letter != '\n' && is_obeyed(letter) { ' ' } else { letter };
-    text.chars().map(letter).collect()
+    let shown = |character: char| if character != '\n' && is_control(character) { ' ' } else { character };
+    text.chars().map(shown).collect()
 }
 
-/// Whether a terminal obeys a character instead of showing it, or changes what is around it.
-fn is_obeyed(letter: char) -> bool {
-    let turns =
+/// Whether a terminal obeys a character instead of showing it, or it is invisible or changes the direction of text.
+fn is_control(character: char) -> bool {
+    let invisible =
         ['\u{200b}'..='\u{200f}', '\u{2028}'..='\u{202e}', '\u{2060}'..='\u{2069}', '\u{feff}'..='\u{feff}'];
-    letter.is_control() || turns.iter().any(|range| range.contains(&letter))
+    character.is_control() || invisible.iter().any(|range| range.contains(&character))
 }
 
 /// The system's reason without Rust's "(os error 2)" tail.

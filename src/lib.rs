@@ -1,24 +1,24 @@
-//! A volumetric toolkit for visual effects and real-time simulation, on OpenVDB. Today: the base layer of snow, a deep layer
-//! that characters press their prints into, and what it stands on.
+//! A volumetric toolkit for visual effects and real-time simulation, on OpenVDB: snow that characters press their prints into,
+//! surfaces of liquids, and small liquids in real time.
 //!
 //! Lengths are metres, times seconds, Y is up. The output is the same, byte for byte, with any number of threads.
 //!
 //! # Where to begin
 //!
-//! | to | take |
+//! | to | use |
 //! |---|---|
 //! | run a shot from a scene file into a folder, as `frazil snow` does | [`scene::Scene`], [`scene::snow::plan`], [`scene::run::Run`] |
 //! | press moving meshes into snow in a frame loop of your own | [`snow::base_layer::BaseLayer`] |
 //! | turn the volume that moving meshes sweep into a level set | [`sweep::chain()`] |
-//! | let mist flow around things, or a gas or liquid of your own | [`snow::mist`], [`flow`] |
+//! | let mist, or a gas or liquid of your own, flow around obstacles | [`snow::mist`], [`flow`] |
 //! | move things: rigid keys, sequences of meshes, glTF characters | [`motion`] |
 //! | make, change, measure and save level sets | [`vdb::level_set`], [`vdb::file`] |
 //! | read and write meshes, as polygons with UVs | [`io::mesh`] |
 //! | read particle caches of other programs | [`io::particles`] |
 //! | make the surface of a liquid from its particles; let a detailed mesh follow them | [`surface`] |
 //! | let a little liquid flow over a terrain in real time | [`shallow`] |
-//! | look at any of it | [`render`] |
-//! | link from C or C++ | `include/frazil.h`, which comes from [`capi`] |
+//! | render previews | [`render`] |
+//! | link from C or C++ | `include/frazil.h`, generated from [`capi`] |
 //!
 //! Everything that takes long takes a [`Context`]: threads, cancel, progress and the times of its phases.
 //!

@@ -1,4 +1,4 @@
-//! The `frazil` command: arguments to library calls to files.
+//! The `frazil` command.
 
 mod cli;
 

@@ -7,7 +7,7 @@ use frazil::Context;
 use frazil::error::Result;
 use frazil::geometry::TriMesh;
 use frazil::geometry::check::faults::Faults;
-use frazil::geometry::check::topology::bodies;
+use frazil::geometry::check::topology::components;
 use frazil::surface::{Params, Particles, Tracker};
 
 use crate::common::liquids::{context, own_surface};
@@ -173,7 +173,7 @@ fn cells(ctx: &Context, scene: &Sequence, steps: usize) {
             run.seconds(&MESH),
             run.share_matched(),
             mesh.triangles.len(),
-            bodies(&mesh.triangles).len(),
+            components(&mesh.triangles).len(),
             run.alive,
             100.0 * mesh.volume() / finest.volume(),
             if is_first { "-".to_string() } else { apart(finest, &mesh, scene.spacing) }
@@ -203,12 +203,12 @@ fn flagged_only(ctx: &Context, scene: &Sequence, runs: &[Run; 2]) {
             mesh.triangles.len(),
             run.tracker.flags().iter().filter(|flag| **flag).count(),
             faults.crossings + faults.corner_crossings,
-            bodies(&mesh.triangles).len(),
+            components(&mesh.triangles).len(),
             100.0 * mesh.volume() / own.volume(),
             apart(&own, &mesh, scene.spacing)
         );
     }
-    let parts = bodies(&own.triangles).len();
+    let parts = components(&own.triangles).len();
     println!("| the particles' surface | - | {} | - | - | {parts} | 100 % | - |", own.triangles.len());
 }
 

@@ -294,7 +294,8 @@ impl Sequence {
             let is_there = |frame: &i32| self.pattern.path(*frame).is_file();
             let last = (frame..=self.last).take_while(is_there).last().unwrap_or(frame);
             let (pattern, origin) = (self.pattern.clone(), args.space.origin.at);
-            let run = MeshSequence::open_seen(pattern, frame, last, args.fps, 0.0, Arc::default(), origin);
+            let run =
+                MeshSequence::open_with_hashes(pattern, frame, last, args.fps, 0.0, Arc::default(), origin);
             self.run = run.ok().map(|run| args.in_metres(Box::new(run)));
         }
         if let Some(motion) = self.run.as_deref() {

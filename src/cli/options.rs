@@ -2,7 +2,7 @@
 
 use frazil::Result;
 use frazil::geometry::mesh::weld::Weld;
-use frazil::geometry::mesh::{BY_OPTION, is_coarse};
+use frazil::geometry::mesh::{BY_OPTION, coarse_warning};
 use frazil::geometry::{DVec3, PolygonMesh, TriMesh};
 use frazil::io::files::sequence::Pattern;
 use frazil::motion::{Space, Up};
@@ -81,7 +81,7 @@ pub fn warn_if_far(path: &Path, mesh: &TriMesh) {
     if mesh.positions.is_empty() {
         return;
     }
-    if let Some(what) = is_coarse(&path.display().to_string(), mesh, BY_OPTION) {
+    if let Some(what) = coarse_warning(&path.display().to_string(), mesh, BY_OPTION) {
         log::warn!("{what}");
     }
 }

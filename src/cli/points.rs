@@ -47,7 +47,7 @@ pub fn description(points: &Points) -> Map<String, Value> {
 /// Describes the points of a file other than .vdb for `frazil info`.
 pub fn info(path: &Path, origin: DVec3) -> Result<Vec<Value>> {
     let mut data = particles::read(path)?;
-    Space { origin, ..Space::OWN }.bring(&mut data);
+    Space { origin, ..Space::OWN }.convert(&mut data);
     // Any size of voxels will do if the file gives none.
     let size = data.voxel_size.unwrap_or(1.0);
     let has_size = data.voxel_size.is_some();
@@ -63,7 +63,7 @@ pub fn info(path: &Path, origin: DVec3) -> Result<Vec<Value>> {
 /// Whether a file's extension is one of point files; .ply does not count, as it may hold a mesh.
 pub fn is_point_file(path: &Path) -> bool {
     let extension = extension(path);
-    extension == "vdb" || extension != "ply" && particles::is_named(path)
+    extension == "vdb" || extension != "ply" && particles::has_extension_of_particles(path)
 }
 
 /// Whether `frazil convert` converts points: a file of points in or out, or a .ply without faces.
@@ -111,11 +111,11 @@ impl Conversion<'_> {
     pub fn run(&self, session: &Session) -> std::result::Result<(), Failure> {
         let is_sequence = Pattern::parse(self.input).is_some();
         let is_written = ["vdb", "usda"].contains(&extension(self.output).as_str());
-        if !is_written && !particles::is_written(self.output) {
+        if !is_written && !particles::can_write(self.output) {
             let what = "the output for points must be a .vdb, .ply, .usda, .bgeo or .xyz file";
             return Err(Failure::of_file(self.output, what));
         }
-        if extension(self.input) != "vdb" && !particles::is_named(self.input) {
+        if extension(self.input) != "vdb" && !particles::has_extension_of_particles(self.input) {
             let what = "points are read from .vdb, .bgeo, .vtk, .vtu, .xyz and .ply files";
             return Err(Failure::of_file(self.input, what));
         }
@@ -155,7 +155,7 @@ impl Conversion<'_> {
             }
             _ => particles::read(path)?,
         };
-        self.space.bring(&mut data);
+        self.space.convert(&mut data);
         let voxel = self.voxel.or(data.voxel_size);
         // Only .vdb files need voxels.
         let default = (extension(self.output) != "vdb").then_some(1.0);

@@ -17,7 +17,7 @@ use locking::lock;
 pub use cancel::Running;
 pub use memory::{machine_memory, peak_memory};
 pub use phases::{PhaseTime, Phases};
-pub use pool::{MOST_THREADS, Pool};
+pub use pool::{MAX_THREADS, Pool};
 pub use progress::Progress;
 
 use crate::error::{Error, Result};
@@ -201,7 +201,7 @@ impl Context {
         let _running = self.begin();
         self.check()?;
         self.enter(name);
-        self.look();
+        self.poll_once();
         let result = if self.is_cancelled() { Err(Error::Cancelled) } else { self.timed(name, work) };
         self.leave(result.is_ok());
         result
@@ -226,7 +226,7 @@ impl Context {
         self.expect(0);
     }
 
-    /// Ends a phase; its last pieces are replaced by the count of phases at once, so that no fraction decreases.
+    /// Ends a phase; the count of phases replaces its count of pieces under one lock, so that no fraction decreases.
     fn leave(&self, done: bool) {
         let mut state = lock(&self.state);
         state.phase = "";
@@ -256,8 +256,8 @@ impl Context {
         self.pieces[0].fetch_add(1, Ordering::Relaxed);
     }
 
-    /// The poll at the beginning of a phase.
-    fn look(&self) {
+    /// Polls once, at the beginning of a phase.
+    fn poll_once(&self) {
         if let Ok(mut watch) = self.poll.try_lock()
             && let Some(watch) = watch.as_mut()
         {
@@ -278,7 +278,7 @@ impl Context {
     /// `Cancelled` when the context was cancelled before, else what `work` returns.
     pub fn polled<R: Send>(&self, work: impl FnOnce() -> Result<R> + Send) -> Result<R> {
         let _running = self.begin();
-        self.look();
+        self.poll_once();
         self.check()?;
         self.run(work)
     }
@@ -464,7 +464,7 @@ mod tests {
     }
 
     #[test]
-    fn memory_beyond_the_limit_is_refused_in_words() {
+    fn memory_beyond_the_limit_is_refused() {
         let ctx = Context::new(Pool::new(0).unwrap());
         assert!(ctx.allow("a layer", u64::MAX).is_ok());
         ctx.set_memory_limit(1_900_000);

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::numeric::cpu::FlushDenormals;
 
 /// Maximum number of threads in a pool.
-pub const MOST_THREADS: usize = 1024;
+pub const MAX_THREADS: usize = 1024;
 
 /// Worker threads, shared by any number of contexts; joined when dropped.
 pub struct Pool {
@@ -18,13 +18,13 @@ pub struct Pool {
 }
 
 impl Pool {
-    /// Starts `threads` workers, at most [`MOST_THREADS`]; 0 runs everything on the caller's thread.
+    /// Starts `threads` workers, at most [`MAX_THREADS`]; 0 runs everything on the caller's thread.
     ///
     /// # Errors
     /// Too many threads, or the system refuses to start them.
     pub fn new(threads: usize) -> Result<Arc<Self>> {
-        if threads > MOST_THREADS {
-            return Err(Error::argument(format!("threads = {threads} is not within 0 to {MOST_THREADS}")));
+        if threads > MAX_THREADS {
+            return Err(Error::argument(format!("threads = {threads} is not within 0 to {MAX_THREADS}")));
         }
         if threads == 0 {
             return Ok(Arc::new(Self { rayon: None, workers: Mutex::default() }));
@@ -55,7 +55,7 @@ impl Pool {
     /// # Errors
     /// As [`Pool::new`].
     pub fn all_cores() -> Result<Arc<Self>> {
-        Self::new(std::thread::available_parallelism().map_or(1, |count| count.get()).min(MOST_THREADS))
+        Self::new(std::thread::available_parallelism().map_or(1, |count| count.get()).min(MAX_THREADS))
     }
 
     /// Number of threads that work at once (at least 1).
@@ -103,13 +103,13 @@ fn on_this_thread<R: Send>(work: impl FnOnce() -> R + Send) -> R {
     if rayon::current_thread_index().is_some() {
         return work();
     }
-    let mut seat = None;
+    let mut worker_slot = None;
     let spawn = |worker| {
-        seat = Some(worker);
+        worker_slot = Some(worker);
         Ok(())
     };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).spawn_handler(spawn).build();
-    let (Ok(pool), Some(seat)) = (pool, seat) else { return work() };
+    let (Ok(pool), Some(worker)) = (pool, worker_slot) else { return work() };
     let mut result = None;
     let owner = Arc::new(Mutex::new(Some(pool)));
     {
@@ -126,7 +126,7 @@ fn on_this_thread<R: Send>(work: impl FnOnce() -> R + Send) -> R {
         if let Some(pool) = &*owner.lock().unwrap_or_else(PoisonError::into_inner) {
             pool.spawn(job);
         }
-        seat.run();
+        worker.run();
     }
     match result.expect("the job was run") {
         Ok(value) => value,
@@ -172,6 +172,6 @@ mod tests {
 
     #[test]
     fn more_threads_than_any_machine_has_are_refused() {
-        assert!(Pool::new(MOST_THREADS + 1).is_err());
+        assert!(Pool::new(MAX_THREADS + 1).is_err());
     }
 }

@@ -4,7 +4,7 @@
 
 use super::lists::Lists;
 
-/// For a vertex around which no triangle was added or removed.
+/// The slot of a vertex around which no triangle was added or removed.
 const NONE: u32 = u32::MAX;
 
 /// The corners of the triangles a b c and b a d after their common edge was flipped.
@@ -25,7 +25,7 @@ pub struct Fans {
 }
 
 impl Fans {
-    /// Those of the wanted vertices; the others must not be changed. Takes two passes over all triangles.
+    /// The triangles around the wanted vertices; those around others must not change. Takes two passes over all triangles.
     pub fn of(vertices: usize, triangles: &[[u32; 3]], is_wanted: impl Fn(u32) -> bool) -> Self {
         let of_triangle = |(corners, triangle): (&[u32; 3], u32)| corners.map(|corner| (corner, triangle));
         let uses = triangles.iter().zip(0..).flat_map(of_triangle);
@@ -66,7 +66,7 @@ impl Fans {
         shared.len() == 2 && shared.iter().all(|&corner| self.around(corner).len() > 3)
     }
 
-    /// Triangles with a corner that a collapse renames, and if it moves the other vertex, those around that.
+    /// The triangles around a vertex that a collapse merges into `to`, and if this moves `to`, those around it.
     pub fn moving(
         &self,
         triangles: &[[u32; 3]],
@@ -78,7 +78,8 @@ impl Fans {
         self.around(from).iter().chain(others).copied()
     }
 
-    /// Adds a vertex on the edge of triangles a b c and b a d, which keep their number and the ends a and b, and the other two parts.
+    /// Adds a vertex on the common edge of triangles `one` (a b c) and `two` (b a d). `one` keeps corner a and `two` corner b; the new
+    /// triangles `three` and `four` have corners b and a.
     pub fn split(&mut self, [one, two]: [u32; 2], [three, four]: [u32; 2], [a, b, c, d]: [u32; 4]) {
         self.slots.push(self.own.len() as u32);
         self.own.push(vec![one, two, three, four]);

@@ -1,8 +1,8 @@
 //! Marching cubes (Lorensen and Cline 1987): the surface, as triangles, in a cube whose corners are inside or outside. If two diagonal
 //! corners of a face are inside, the surface separates them (Montani, Scateni and Scopigno 1994), so that neighbouring cubes match.
 //!
-//! The cases are generated: on each face the surface is a line from where its outline enters the inside to where it leaves again; these
-//! lines form loops, which are filled with triangles.
+//! The cases are generated: on each face the surface is a line from where the face's outline enters the inside to where it leaves again.
+//! These lines form loops, which are filled with triangles.
 
 use std::sync::OnceLock;
 
@@ -58,7 +58,7 @@ fn loops(case: usize) -> Vec<Vec<Edge>> {
         let mut ring = vec![begin];
         while end != begin {
             ring.push(end);
-            let next = lines.iter().position(|line| line[0] == end).expect("lines join");
+            let next = lines.iter().position(|line| line[0] == end).expect("the lines form loops");
             end = lines.swap_remove(next)[1];
         }
         rings.push(ring);

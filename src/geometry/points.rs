@@ -93,7 +93,7 @@ impl<T: Copy> Column<T> {
 }
 
 impl<T: Copy + PartialEq> Column<T> {
-    /// Adds the values of other points, given the numbers of both.
+    /// Appends the values of other points; the counts are of both sets of points.
     fn append(&mut self, other: &Self, [own, others]: [usize; 2]) {
         if self == other && matches!(self, Self::Uniform(_)) {
             return;
@@ -182,7 +182,7 @@ impl Values {
     }
 
     /// The first point whose value is not finite.
-    fn first_wild(&self) -> Option<usize> {
+    fn first_not_finite(&self) -> Option<usize> {
         match self {
             Self::Float(column) => column.stored().iter().position(|value| !value.is_finite()),
             Self::Vector(column) => {
@@ -205,7 +205,7 @@ impl Points {
         let split = |(point, position): (usize, &DVec3)| -> Result<([i32; 3], [f32; 3])> {
             let index = position / voxel_size;
             let cell = index.map(f64::round);
-            // Negated so that NaN is refused too.
+            // Negated to refuse NaN too.
             if !cell.iter().all(|part| part.abs() < limit) {
                 let what = format!("point {} is not finite, or too far from the origin", point + 1);
                 return Err(Error::argument(what));
@@ -327,7 +327,7 @@ impl Points {
             fail_if(there != count, || {
                 Error::argument(format!("attribute \"{name}\" has {there} values for {count} points"))
             })?;
-            if let Some(point) = values.first_wild() {
+            if let Some(point) = values.first_not_finite() {
                 let what = format!("attribute \"{name}\" of point {} is not finite", point + 1);
                 return Err(Error::argument(what));
             }
@@ -374,7 +374,7 @@ mod tests {
     }
 
     #[test]
-    fn another_order_takes_every_array_along() {
+    fn reordering_applies_to_every_array() {
         let mut points = three();
         points.reorder(&[2, 0, 1]);
         assert_eq!(points.cells[1], [1, -1, 0]);
@@ -384,7 +384,7 @@ mod tests {
     }
 
     #[test]
-    fn points_are_added_behind_others() {
+    fn points_are_appended() {
         let mut points = three();
         let mut more = three();
         more.set("id", Values::Long(Column::Uniform(9)));
@@ -404,7 +404,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named() {
+    fn errors_name_the_fault() {
         let refused = |change: fn(&mut Points), what: &str| {
             let mut points = three();
             change(&mut points);

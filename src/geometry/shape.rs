@@ -4,10 +4,10 @@ use std::borrow::Borrow;
 
 use super::DVec3;
 
-/// Minimum and maximum corner of the box around positions; infinite, and inside out, without any.
+/// Minimum and maximum corner of the box around positions; without any, infinity and -infinity.
 pub fn bounds(positions: impl IntoIterator<Item = impl Borrow<DVec3>>) -> (DVec3, DVec3) {
-    let nowhere = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
-    positions.into_iter().fold(nowhere, |(low, high), p| (low.inf(p.borrow()), high.sup(p.borrow())))
+    let empty = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
+    positions.into_iter().fold(empty, |(low, high), p| (low.inf(p.borrow()), high.sup(p.borrow())))
 }
 
 /// A normal of a triangle, as long as twice its area.
@@ -30,10 +30,10 @@ pub fn longest_first([a, b, c]: [DVec3; 3]) -> [DVec3; 3] {
     }
 }
 
-/// Altitude of a triangle on its longest edge, over that edge, which counts as at least `least`: 0.87 at best, 0 where all corners are at
+/// Altitude of a triangle on its longest edge, over that edge, which counts as at least `min_edge`: 0.87 at best, 0 where all corners are at
 /// one position.
-pub fn altitude(corners: &[DVec3; 3], least: f64) -> f64 {
+pub fn altitude(corners: &[DVec3; 3], min_edge: f64) -> f64 {
     let [a, b, c] = corners;
     let square = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
-    if square > 0.0 { normal(corners).norm() / square.max(least * least) } else { 0.0 }
+    if square > 0.0 { normal(corners).norm() / square.max(min_edge * min_edge) } else { 0.0 }
 }

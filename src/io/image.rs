@@ -9,11 +9,11 @@ use super::files::caught::caught;
 use crate::error::{Error, Result, fail_if};
 
 /// Maximum size (bytes) of an image when unpacked: 16,384 x 16,384 pixels with four channels of 16 bits.
-const MOST_BYTES: usize = 1 << 31;
+const MAX_BYTES: usize = 1 << 31;
 
 /// A greyscale image.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Grey {
+pub struct GreyImage {
     /// Count of pixels across and down.
     pub size: [usize; 2],
     /// Values row by row from the top: 0 is black and 1 is white.
@@ -26,19 +26,19 @@ pub struct Grey {
 ///
 /// # Errors
 /// A file that is not a PNG, is cut short or damaged, is over 2 GB when unpacked, or has colours.
-pub fn parse(path: &Path, bytes: &[u8]) -> Result<Grey> {
+pub fn parse(path: &Path, bytes: &[u8]) -> Result<GreyImage> {
     fail_if(bytes.is_empty(), || Error::file(path, "the file is empty"))?;
     caught(path, || decode(bytes).map_err(|what| Error::file(path, what)))
 }
 
-fn decode(bytes: &[u8]) -> std::result::Result<Grey, String> {
+fn decode(bytes: &[u8]) -> std::result::Result<GreyImage, String> {
     let wrong = |error: png::DecodingError| format!("is not an image that can be read: {error}");
-    let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), Limits { bytes: MOST_BYTES });
+    let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), Limits { bytes: MAX_BYTES });
     // Palettes and depths below 8 bits are expanded to 8 bits.
     decoder.set_transformations(Transformations::EXPAND);
     let mut reader = decoder.read_info().map_err(wrong)?;
     let levels = 1 << (reader.info().bit_depth as u32).min(16);
-    let room = reader.output_buffer_size().filter(|room| *room <= MOST_BYTES);
+    let room = reader.output_buffer_size().filter(|room| *room <= MAX_BYTES);
     let mut pixels = vec![0; room.ok_or("is an image of over 2 GB")?];
     let frame = reader.next_frame(&mut pixels).map_err(wrong)?;
     let pixels = &pixels[..frame.buffer_size()];
@@ -57,7 +57,7 @@ fn decode(bytes: &[u8]) -> std::result::Result<Grey, String> {
         }
         _ => greys(pixels, channels, size, |value| f32::from(value) / 255.0),
     }?;
-    Ok(Grey { size, values, levels })
+    Ok(GreyImage { size, values, levels })
 }
 
 /// The grey values of pixels with this many channels.
@@ -88,7 +88,7 @@ mod tests {
         bytes
     }
 
-    fn read(bytes: &[u8]) -> std::result::Result<Grey, String> {
+    fn read(bytes: &[u8]) -> std::result::Result<GreyImage, String> {
         parse(Path::new("h.png"), bytes).map_err(|error| error.to_string())
     }
 

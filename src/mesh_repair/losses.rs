@@ -2,7 +2,7 @@
 
 use super::prepare::Closed;
 use crate::geometry::check::faults::counted_area;
-use crate::geometry::{DVec3, TriMesh};
+use crate::geometry::{DVec3, TriMesh, Vec3};
 
 /// Share of the area or of the volume below which something is missing.
 const HALF: f64 = 0.5;
@@ -30,7 +30,7 @@ impl Losses {
     /// Compares a mesh, its closed version and the result.
     pub(super) fn of(before: &TriMesh, closed: &Closed, after: &TriMesh) -> Self {
         let volume = closed.mesh.volume();
-        let [old, new] = [before, after].map(named_bounds);
+        let [old, new] = [before, after].map(bounds);
         let side = |[low, high]: [DVec3; 2]| (high - low).max().max(0.0);
         let shrunk = (new[0] - old[0]).sup(&(old[1] - new[1])).max();
         Self {
@@ -48,7 +48,7 @@ impl Losses {
         self.areas[1] < NEARLY_NONE * self.areas[0] && (is_flat || self.shrunk > HALF * self.sides[0])
     }
 
-    /// A warning if much is lost, with cells of an edge (m); none if nothing is missing.
+    /// A warning if much is lost; `cell` is the edge of a cell (m).
     pub fn warning(&self, cell: f64) -> Option<String> {
         let [area, area_now] = self.areas;
         let [volume, volume_now] = self.volumes;
@@ -82,10 +82,9 @@ impl Losses {
     }
 }
 
-/// Minimum and maximum corner (m) of the vertices that triangles use.
-fn named_bounds(mesh: &TriMesh) -> [DVec3; 2] {
-    let nowhere = [DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY)];
-    let corners =
-        mesh.triangles.as_flattened().iter().map(|&vertex| mesh.positions[vertex as usize].cast::<f64>());
-    corners.fold(nowhere, |[low, high], position| [low.inf(&position), high.sup(&position)])
+/// Minimum and maximum corner (m) of a mesh; without triangles, infinity and -infinity.
+fn bounds(mesh: &TriMesh) -> [DVec3; 2] {
+    let empty = (Vec3::repeat(f32::INFINITY), Vec3::repeat(f32::NEG_INFINITY));
+    let (low, high) = mesh.bounds().unwrap_or(empty);
+    [low.cast(), high.cast()]
 }

@@ -51,7 +51,7 @@ pub(super) use self::cut::exact::{GridEdge, end};
 pub(super) use self::cut::pierces::Pierces;
 pub use self::losses::Losses;
 pub use self::prepare::Prepared;
-pub(super) use self::region::faulty_cells::overlaps;
+pub(super) use self::region::faulty_cells::add_overlaps;
 pub(super) use self::region::{CellSet, Inside};
 
 /// A repaired mesh.
@@ -92,8 +92,8 @@ pub struct RepairReport {
 const TRIES: usize = 32;
 /// How often slivers are removed.
 const ROUNDS: usize = 4;
-/// Bytes for each part of the mesh as large as a cell's face: it pierces up to 1.7 edges of the grid, some 150 bytes each while they are
-/// sorted.
+/// Memory (bytes) for the area of a cell's face: a mesh of that area pierces up to 1.7 edges of the grid, some 150 bytes each while they
+/// are sorted.
 const FACE: f64 = 256.0;
 /// Number of cell sizes tried if nothing would be left: the requested one, then half of the previous one each time.
 const HALVINGS: u32 = 6;
@@ -154,7 +154,7 @@ fn rebuild(ctx: &Context, closed: &Closed, own: usize, cell: f64) -> Result<Opti
     let shape = Shape { fixed, triangles: closed.mesh.triangles.clone(), pierces };
     ctx.check()?;
     let flagged = region::faulty_cells::flagged(ctx, closed, &shape)?;
-    let rebuilt = ladder(ctx, &shape, (&in_cells, &lattice), &flagged, &shape.pierces)?;
+    let rebuilt = rebuild_by_levels(ctx, &shape, (&in_cells, &lattice), &flagged, &shape.pierces)?;
     if rebuilt.draft.triangles.is_empty() {
         return Ok(None);
     }
@@ -187,7 +187,7 @@ pub(super) struct Rebuilt {
 ///
 /// # Errors
 /// Cancel.
-pub(super) fn ladder(
+pub(super) fn rebuild_by_levels(
     ctx: &Context,
     shape: &Shape,
     (in_cells, lattice): (&[DVec3], &Lattice),
@@ -199,14 +199,14 @@ pub(super) fn ladder(
         let set = match rebuild_level {
             0 => flagged.clone(),
             1 => flagged.with_ring(),
-            2 => region::faulty_cells::parts(shape, flagged),
+            2 => region::faulty_cells::with_parts(shape, flagged),
             _ => {
-                let mut all = region::faulty_cells::everything(shape);
+                let mut all = region::faulty_cells::all_cells(shape);
                 flagged.iter().for_each(|cell| _ = all.add(cell));
                 all
             }
         };
-        let Some((mut draft, cells)) = tried(ctx, shape, set, in_cells, inside)? else { continue };
+        let Some((mut draft, cells)) = rebuild_in(ctx, shape, set, in_cells, inside)? else { continue };
         let slivers = tidied(&mut draft, lattice);
         let is_whole = Topology::of(draft.positions.len(), &draft.triangles).is_watertight();
         if draft.triangles.is_empty() || (is_whole && (slivers == 0 || rebuild_level == 3)) {
@@ -238,7 +238,7 @@ fn tidied(draft: &mut Draft, lattice: &Lattice) -> usize {
 }
 
 /// Cuts the mesh along a set of cells and fills these; the set grows where that fails. None if it fails however far the set grows.
-fn tried(
+fn rebuild_in(
     ctx: &Context,
     shape: &Shape,
     mut set: CellSet,
@@ -249,7 +249,7 @@ fn tried(
     for _ in 0..TRIES {
         ctx.check()?;
         grow(&mut set, added, &shape.pierces, inside);
-        match once(shape, &set, in_cells, inside) {
+        match cut_and_fill(shape, &set, in_cells, inside) {
             Ok(draft) => return Ok(Some((draft, set.count()))),
             Err(Trouble(cells)) => {
                 added = cells.iter().copied().filter(|cell| set.add(*cell)).collect();
@@ -268,7 +268,7 @@ fn tried(
     Ok(None)
 }
 
-fn once(
+fn cut_and_fill(
     shape: &Shape,
     set: &CellSet,
     in_cells: &[DVec3],
@@ -318,9 +318,9 @@ mod tests {
 
     /// A sphere of 2048 triangles.
     fn sphere(centre: [f32; 3], radius: f32) -> TriMesh {
-        let (places, triangles) = test_meshes::sphere(4);
+        let (unit_sphere, triangles) = test_meshes::sphere(4);
         let positions =
-            places.iter().map(|place| place.cast::<f32>() * radius + Vec3::from(centre)).collect();
+            unit_sphere.iter().map(|position| position.cast::<f32>() * radius + Vec3::from(centre)).collect();
         TriMesh { positions, triangles }
     }
 

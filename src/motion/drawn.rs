@@ -51,7 +51,7 @@ pub(super) struct Used {
 }
 
 impl Used {
-    /// Those of `count` vertices.
+    /// The vertices out of `count` that triangles use.
     pub fn of(count: usize, triangles: &[[u32; 3]]) -> Self {
         let Some(used) = used(count, triangles) else { return Self { count, own: None } };
         let triangles = renumbered(triangles, &used);

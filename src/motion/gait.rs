@@ -3,18 +3,19 @@
 //! Walk cycles usually walk in place: the standing foot moves backwards under the figure. If the figure is carried forwards at that speed,
 //! the foot stays where it stands.
 
-use super::{Motion, Poses, span};
+use super::{Motion, Poses};
 use crate::error::Result;
 use crate::geometry::DVec3;
+use crate::geometry::shape::bounds;
 
 /// Sampled poses per second of the motion, and their minimum and maximum number.
 const RATE: f64 = 60.0;
 const POSES: (f64, f64) = (24.0, 240.0);
 /// Maximum vertices posed, over all poses: bounds the time of the analysis.
-const MOST_VERTICES: f64 = 5e7;
-/// Tolerance, as a fraction of a figure's height: standing parts may be this far above the lowest part of their pose. That part may be as
-/// far above the level that the lowest parts of the fraction `REACHED` of the poses reach: a toe that digs in, or a jump, must not hide a
-/// walk.
+const MAX_VERTICES: f64 = 5e7;
+/// Tolerance, as a fraction of a figure's height: standing parts may be this far above the lowest part of their pose, and that part as far
+/// above the ground. The ground is the quantile `REACHED` of the lowest parts' heights, so that neither a toe that digs in nor a jump hides
+/// a walk.
 const STANDS: f64 = 0.015;
 const REACHED: f64 = 0.4;
 /// Parts that rise or fall by more than the fraction `LEVEL` of their horizontal path do not stand, unless they do so by at most the
@@ -24,7 +25,7 @@ const STILL: f64 = 0.1;
 /// Maximum spread of steady velocities, as a fraction of the speed: walks have up to 0.22, runs 0.45.
 const STEADY: f64 = 0.33;
 /// Minimum fraction of the time that something stands; else the motion is not a gait.
-const LEAST_TIME: f64 = 0.2;
+const MIN_STANDING: f64 = 0.2;
 
 /// How a motion's lowest parts move.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,7 +45,7 @@ pub struct Gait {
 impl Gait {
     /// Whether standing parts move steadily enough, in one direction, for one speed to carry the figure.
     pub fn is_steady(&self) -> bool {
-        self.standing >= LEAST_TIME && self.spread <= STEADY * self.velocity.norm()
+        self.standing >= MIN_STANDING && self.spread <= STEADY * self.velocity.norm()
     }
 
     /// Velocity (m/s) at which the figure must be carried so that standing parts stay where they are.
@@ -59,8 +60,8 @@ impl Gait {
 /// A pose that cannot be computed.
 pub fn gait(motion: &dyn Motion, from: f64, to: f64) -> Result<Option<Gait>> {
     let vertices = motion.vertex_count().max(1) as f64;
-    let most = (MOST_VERTICES / vertices).clamp(POSES.0, POSES.1);
-    let count = ((to - from) * RATE).ceil().clamp(POSES.0, most) as usize;
+    let max_count = (MAX_VERTICES / vertices).clamp(POSES.0, POSES.1);
+    let count = ((to - from) * RATE).ceil().clamp(POSES.0, max_count) as usize;
     let step = (to - from) / count as f64;
     if step.is_nan() || step <= 0.0 || motion.vertex_count() == 0 {
         return Ok(None);
@@ -69,23 +70,25 @@ pub fn gait(motion: &dyn Motion, from: f64, to: f64) -> Result<Option<Gait>> {
     let mut poses = Poses::start(motion, from)?;
     let (mut lows, mut height) = (Vec::with_capacity(count + 1), 0.0f64);
     for number in 0..=count {
-        let (low, high) = span(poses.go_to(time(number))?.1);
+        let (low, high) = bounds(poses.go_to(time(number))?.1);
         lows.push(low.y);
         height = height.max(high.y - low.y);
     }
     let near = STANDS * height;
-    let level = part_of(lows.clone(), REACHED) + near;
+    let ground = quantile(lows.clone(), REACHED) + near;
     let mut velocities = Vec::new();
     poses.go_to(from)?;
     for number in 1..=count {
         let (before, pose) = poses.go_to(time(number))?;
         let (low, lower) = (lows[number - 1], lows[number]);
         let stands = |(p, q): &(&DVec3, &DVec3)| {
-            let way = *q - *p;
-            let along = DVec3::new(way.x, 0.0, way.z).norm();
-            p.y <= low + near && q.y <= lower + near && way.y.abs() <= (LEVEL * along).max(STILL * near)
+            let displacement = *q - *p;
+            let along = DVec3::new(displacement.x, 0.0, displacement.z).norm();
+            p.y <= low + near
+                && q.y <= lower + near
+                && displacement.y.abs() <= (LEVEL * along).max(STILL * near)
         };
-        if low.max(lower) <= level {
+        if low.max(lower) <= ground {
             let standing = before.iter().zip(pose).filter(stands);
             let (sum, parts) = standing.fold((DVec3::zeros(), 0), |(sum, n), (p, q)| (sum + (q - p), n + 1));
             if parts > 0 {
@@ -96,17 +99,17 @@ pub fn gait(motion: &dyn Motion, from: f64, to: f64) -> Result<Option<Gait>> {
     }
     let lowest = lows.into_iter().fold(f64::INFINITY, f64::min);
     let standing = velocities.len() as f64 / count as f64;
-    if standing < LEAST_TIME {
+    if standing < MIN_STANDING {
         return Ok(None);
     }
-    let middle = |pick: fn(&DVec3) -> f64| part_of(velocities.iter().map(pick).collect(), 0.5);
+    let middle = |pick: fn(&DVec3) -> f64| quantile(velocities.iter().map(pick).collect(), 0.5);
     let velocity = DVec3::new(middle(|v| v.x), 0.0, middle(|v| v.z));
-    let spread = part_of(velocities.iter().map(|v| (v - velocity).norm()).collect(), 0.5);
+    let spread = quantile(velocities.iter().map(|v| (v - velocity).norm()).collect(), 0.5);
     Ok(Some(Gait { velocity, spread, standing, lowest, height }))
 }
 
 /// A quantile: the median for 0.5.
-fn part_of(mut values: Vec<f64>, part: f64) -> f64 {
+fn quantile(mut values: Vec<f64>, part: f64) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     values.get((values.len() as f64 * part) as usize).copied().unwrap_or(0.0)
 }
@@ -135,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn a_foot_that_goes_back_asks_to_be_carried_forward() {
+    fn a_foot_that_moves_back_carries_the_figure_forward() {
         let gait = gait(&walk(), 0.0, 1.0).unwrap().unwrap();
         assert!((gait.carry() - DVec3::z() * 1.2).norm() < 0.02, "{gait:?}");
         assert!(gait.is_steady() && gait.lowest == 0.0 && (0.45..0.6).contains(&gait.standing), "{gait:?}");

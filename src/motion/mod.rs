@@ -13,7 +13,7 @@ pub use drawn::{Drawn, missing_uvs};
 pub use gait::{Gait, gait};
 pub use gltf::{Character, Contents, Play};
 pub use morph::Morph;
-pub use poses::{Poses, between, span};
+pub use poses::{Poses, between};
 pub use rigid::{Key, Keys, Placed, Rigid};
 pub use sequence::MeshSequence;
 pub use space::{Space, Up};
@@ -115,7 +115,7 @@ pub trait Motion: Send + Sync {
     }
 
     /// Whether vertices that always move together are already one vertex; others that merely coincide at some time are not welded.
-    fn keeps_its_welds(&self) -> bool {
+    fn is_welded(&self) -> bool {
         false
     }
 }

@@ -46,9 +46,3 @@ pub fn between(from: &[Vec3], to: &[Vec3], part: f64, out: &mut Vec<DVec3>) {
         _ => out.extend(from.iter().zip(to).map(|(p, q)| p.cast::<f64>().lerp(&q.cast(), part))),
     }
 }
-
-/// Bounding box of positions; infinite with its corners swapped if there are none.
-pub fn span(positions: &[DVec3]) -> (DVec3, DVec3) {
-    let none = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
-    positions.iter().fold(none, |(low, high), position| (low.inf(position), high.sup(position)))
-}

@@ -211,7 +211,7 @@ impl Placed {
         Self { inner, space, keys }
     }
 
-    fn position(&self, time: f64, positions: &mut [DVec3]) {
+    fn place(&self, time: f64, positions: &mut [DVec3]) {
         let (rotation, at) = self.keys.at(time);
         positions.iter_mut().for_each(|p| *p = rotation * self.space.position(*p) + at);
     }
@@ -228,7 +228,7 @@ impl Motion for Placed {
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         self.inner.pose(time, out)?;
-        self.position(time, out);
+        self.place(time, out);
         Ok(())
     }
 
@@ -242,7 +242,7 @@ impl Motion for Placed {
 
     fn drawn_pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         self.inner.drawn_pose(time, out)?;
-        self.position(time, out);
+        self.place(time, out);
         Ok(())
     }
 
@@ -262,8 +262,8 @@ impl Motion for Placed {
         self.inner.turning(from, to) + self.keys.turning(from, to)
     }
 
-    fn keeps_its_welds(&self) -> bool {
-        self.inner.keeps_its_welds()
+    fn is_welded(&self) -> bool {
+        self.inner.is_welded()
     }
 }
 
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn sines_are_not_the_machines_own() {
+    fn sines_are_those_of_libm() {
         for step in 0..40_000 {
             let angle = f64::from(step) * 0.000_37 - 3.0;
             let key = Key { time: 0.0, at: DVec3::zeros(), turn: DVec3::new(angle, 0.0, 0.0) };
@@ -325,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_must_rise() {
+    fn keys_must_ascend() {
         let key = Key { time: 1.0, at: DVec3::zeros(), turn: DVec3::zeros() };
         assert!(Keys::new(vec![key, key]).is_err());
     }

@@ -25,7 +25,7 @@ pub struct MeshSequence {
     polygons: PolygonMesh,
     faces: Faces,
     /// Contents of the files when they were read.
-    seen: Arc<InputHashes>,
+    input_hashes: Arc<InputHashes>,
     /// Subtracted from positions as they are read (the files' unit).
     origin: DVec3,
     /// Whether the frame after the last exists and can be read: the velocities ahead at the last frame need it.
@@ -39,45 +39,45 @@ impl MeshSequence {
     /// # Errors
     /// A frame that is missing (named), or a first frame that cannot be read.
     pub fn open(pattern: Pattern, first: i32, last: i32, fps: f64, offset: f64) -> Result<Self> {
-        Self::open_seen(pattern, first, last, fps, offset, Arc::default(), DVec3::zeros())
+        Self::open_with_hashes(pattern, first, last, fps, offset, Arc::default(), DVec3::zeros())
     }
 
-    /// As [`MeshSequence::open`]; `seen` records the contents of the files when they were read; `origin` (the files' unit and axes) is
+    /// As [`MeshSequence::open`]; `input_hashes` records the contents of the files when they were read; `origin` (the files' unit and axes) is
     /// subtracted from positions.
     ///
     /// # Errors
     /// As [`MeshSequence::open`]; later, from a pose, a file that has changed.
-    pub fn open_seen(
+    pub fn open_with_hashes(
         pattern: Pattern,
         first: i32,
         last: i32,
         fps: f64,
         offset: f64,
-        seen: Arc<InputHashes>,
+        input_hashes: Arc<InputHashes>,
         origin: DVec3,
     ) -> Result<Self> {
         if let Some(missing) = (first..=last).map(|frame| pattern.path(frame)).find(|path| !path.is_file()) {
             return Err(Error::file(missing, "the frame is missing from the sequence"));
         }
         let first_path = pattern.path(first);
-        let mut polygons = mesh::parse_polygons_from(&first_path, &seen.read(&first_path)?, origin)?;
+        let mut polygons = mesh::parse_polygons_from(&first_path, &input_hashes.read(&first_path)?, origin)?;
         let (faces, positions) = Faces::new(polygons.clone());
         polygons.uvs = None;
         let kept = Mutex::new(vec![(first, Arc::new(positions))]);
         let continues = OnceLock::new();
-        Ok(Self { pattern, first, last, fps, offset, polygons, faces, seen, origin, continues, kept })
+        Ok(Self { pattern, first, last, fps, offset, polygons, faces, input_hashes, origin, continues, kept })
     }
 
     fn frame(&self, frame: i32) -> Result<Arc<Vec<Vec3>>> {
         let known = |kept: &[(i32, Arc<Vec<Vec3>>)]| {
             kept.iter().find(|(number, _)| *number == frame).map(|(_, positions)| positions.clone())
         };
-        if let Some(positions) = known(&self.kept.lock().expect("no panic holds this lock")) {
+        if let Some(positions) = known(&self.kept.lock().expect("no panic while it is locked")) {
             return Ok(positions);
         }
         // Read without holding the lock: several frames may be read at once.
         let positions = Arc::new(self.read(frame)?);
-        let mut kept = self.kept.lock().expect("no panic holds this lock");
+        let mut kept = self.kept.lock().expect("no panic while it is locked");
         if known(&kept).is_none() {
             kept.push((frame, positions.clone()));
             if kept.len() > KEPT {
@@ -89,7 +89,7 @@ impl MeshSequence {
 
     fn read(&self, frame: i32) -> Result<Vec<Vec3>> {
         let path = self.pattern.path(frame);
-        let mesh = mesh::parse_polygons_from(&path, &self.seen.read(&path)?, self.origin)?;
+        let mesh = mesh::parse_polygons_from(&path, &self.input_hashes.read(&path)?, self.origin)?;
         if !mesh.has_faces_of(&self.polygons) {
             let count = |of: &PolygonMesh| [of.positions.len(), of.ends.len()];
             let ([vertices, faces], [own, own_faces]) = (count(&self.polygons), count(&mesh));

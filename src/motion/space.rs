@@ -55,7 +55,7 @@ impl Space {
 
     /// Converts points of the file to metres, Y up: positions, voxels, the vectors `v`, `vel`, `velocity` and `rest`, and the radius
     /// `pscale`. Other attributes stay as they are.
-    pub fn bring(&self, cloud: &mut ParticleData) {
+    pub fn convert(&self, cloud: &mut ParticleData) {
         if *self == Self::OWN {
             return;
         }

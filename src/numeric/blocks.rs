@@ -52,7 +52,7 @@ impl Block {
     }
 }
 
-/// The new contents of a block position of a grid: dense values, or one value for all 512 voxels.
+/// New contents of a grid at the position of a block: dense values, or one value for all 512 voxels.
 #[derive(Clone, PartialEq)]
 pub enum BlockEdit {
     /// Dense values.

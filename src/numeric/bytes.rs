@@ -46,27 +46,27 @@ impl<'a> Reader<'a> {
         Self(bytes)
     }
 
-    /// The bytes that are left.
+    /// The remaining bytes.
     pub fn rest(&self) -> &'a [u8] {
         self.0
     }
 
-    /// The next bytes, as many as asked for.
+    /// The next `count` bytes.
     ///
     /// # Errors
     /// Fewer are left.
     pub fn bytes(&mut self, count: usize) -> Result<&'a [u8]> {
-        let (first, rest) = self.0.split_at_checked(count).ok_or_else(cut)?;
+        let (first, rest) = self.0.split_at_checked(count).ok_or_else(truncated)?;
         self.0 = rest;
         Ok(first)
     }
 
-    /// The next bytes.
+    /// The next `N` bytes.
     ///
     /// # Errors
     /// Fewer are left.
     pub fn take<const N: usize>(&mut self) -> Result<[u8; N]> {
-        let (first, rest) = self.0.split_first_chunk().ok_or_else(cut)?;
+        let (first, rest) = self.0.split_first_chunk().ok_or_else(truncated)?;
         self.0 = rest;
         Ok(*first)
     }
@@ -77,7 +77,7 @@ impl<'a> Reader<'a> {
     /// Too few bytes are left for them.
     pub fn count(&mut self, bytes: usize) -> Result<usize> {
         let count = u64::from_le_bytes(self.take()?) as usize;
-        if count > self.0.len() / bytes { Err(cut()) } else { Ok(count) }
+        if count > self.0.len() / bytes { Err(truncated()) } else { Ok(count) }
     }
 
     /// An unsigned number.
@@ -133,15 +133,15 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Checks that something holds of a state.
+/// Checks a condition on a state; `wrong` is the error's message.
 ///
 /// # Errors
-/// `Bytes`: it does not; `wrong` says what is wrong then.
+/// `Bytes`: it does not hold.
 pub fn require(holds: bool, wrong: impl Display) -> Result<()> {
     if holds { Ok(()) } else { Err(Error::Bytes(wrong.to_string())) }
 }
 
-fn cut() -> Error {
+fn truncated() -> Error {
     Error::Bytes("the state is cut short".into())
 }
 

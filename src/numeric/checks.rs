@@ -1,19 +1,19 @@
-//! Checks of what a caller gives.
+//! Checks of arguments.
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;
 
 use crate::error::{Error, Result};
 
-/// Checks that something holds.
+/// Checks a condition; `wrong` is the error's message.
 ///
 /// # Errors
-/// `Argument`: it does not; `wrong` says what is wrong then.
+/// `Argument`: it does not hold.
 pub fn ensure(holds: bool, wrong: impl Display) -> Result<()> {
     if holds { Ok(()) } else { Err(Error::argument(wrong.to_string())) }
 }
 
-/// Checks that a number in a unit, given with a space before it, is within a range.
+/// Checks that a number is within a range; `unit` begins with a space, or is empty.
 ///
 /// # Errors
 /// `Argument`: it is not.
@@ -31,18 +31,18 @@ pub fn check_not_negative(name: &str, value: f64) -> Result<()> {
     ensure(holds, format_args!("{name} = {value} is not finite and 0 or more"))
 }
 
-/// Checks that there is one of something for each of some others.
+/// Checks that there are as many items (`what`) as `others` (`of`).
 ///
 /// # Errors
-/// `Argument`: there is another count.
+/// `Argument`: the counts differ.
 pub fn check_each(count: usize, what: &str, others: usize, of: &str) -> Result<()> {
     ensure(count == others, format_args!("{count} {what} are not one for each of {others} {of}"))
 }
 
-/// As [`check_each`], for room that the caller gives for results.
+/// As [`check_each`], for the length of a caller's output array.
 ///
 /// # Errors
-/// `Argument`: there is another count.
+/// `Argument`: the counts differ.
 pub fn check_room(room: usize, what: &str, others: usize, of: &str) -> Result<()> {
     ensure(room == others, format_args!("room for {room} {what} is not that of {others} {of}"))
 }

@@ -51,8 +51,8 @@ fn detect() -> CpuLevel {
     CpuLevel::Baseline
 }
 
-/// Calls a function's copy for the instruction set in use; `at most avx2` where wider vectors do not pay. The function may be one of a type
-/// (`Rows::run`) and have generic arguments (`solve::<true>`).
+/// Calls the copy of a function that is compiled for the instruction set in use. `at most avx2` makes no AVX-512 copy, where wider vectors
+/// do not pay. The function may be a type's (`Rows::run`) and have generic arguments (`solve::<true>`).
 macro_rules! dispatch {
     (at most avx2: $body:ident $(::$path:ident)* $(::<$($generic:tt),+>)?
         ($($name:ident: $kind:ty),*) $(-> $out:ty)?) => {{
@@ -111,9 +111,9 @@ impl FlushDenormals {
         #[cfg(target_arch = "x86_64")]
         {
             /// All exceptions masked, rounding to nearest: the state that programs start with.
-            const USUAL: u32 = 0x1f80;
+            const DEFAULT: u32 = 0x1f80;
             let before = control();
-            set_control(USUAL | FLUSH);
+            set_control(DEFAULT | FLUSH);
             Self { before }
         }
         #[cfg(not(target_arch = "x86_64"))]

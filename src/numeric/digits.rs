@@ -3,7 +3,7 @@
 /// Significant digits of a number that a user gave: they hide the rounding errors of a sum or a product.
 const DIGITS: usize = 12;
 /// Significant digits of a bound of a range, which may have been computed.
-const ENDS: usize = 6;
+const BOUND_DIGITS: usize = 6;
 
 /// A number that a user gave, as the user wrote it.
 pub fn given(value: f64) -> String {
@@ -11,13 +11,13 @@ pub fn given(value: f64) -> String {
 }
 
 /// A bound of a range.
-pub fn end(value: f64) -> String {
-    digits(value, ENDS)
+pub fn bound(value: f64) -> String {
+    digits(value, BOUND_DIGITS)
 }
 
 /// A number with at most this many significant digits, and with an exponent where it would otherwise be all zeroes.
-fn digits(value: f64, most: usize) -> String {
-    let rounded = format!("{value:.*e}", most - 1).parse().unwrap_or(value);
+fn digits(value: f64, max_digits: usize) -> String {
+    let rounded = format!("{value:.*e}", max_digits - 1).parse().unwrap_or(value);
     // No minus sign on zero.
     let rounded = if rounded == 0.0 { 0.0 } else { rounded };
     if rounded == 0.0 || !rounded.is_finite() || (1e-10..1e15).contains(&rounded.abs()) {
@@ -32,7 +32,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_have_digits_that_say_something() {
+    fn numbers_are_rounded_for_messages() {
         for (value, wanted) in [
             (0.1 + 0.2, "0.3"),
             (-0.0, "0"),
@@ -48,7 +48,7 @@ mod tests {
             assert_eq!(given(value), wanted);
         }
         assert_eq!(
-            (end(0.02 * 0.02), end(8.0 * 0.02), end(2.0 / 3.0)),
+            (bound(0.02 * 0.02), bound(8.0 * 0.02), bound(2.0 / 3.0)),
             ("0.0004".into(), "0.16".into(), "0.666667".into())
         );
     }

@@ -55,18 +55,18 @@ impl Lanes {
         [Self(store([x, z])), Self(store([y, w]))]
     }
 
-    /// Each lane gets the number of the previous one, the first lane gets `first`.
+    /// Moves the numbers up by a lane; the first lane gets `first`.
     #[inline(always)]
-    pub fn behind(self, first: f32) -> Self {
+    pub fn shift_up(self, first: f32) -> Self {
         let [low, high] = load(&self.0);
-        Self(store([half::behind(low, half::all(first)), half::behind(high, half::last(low))]))
+        Self(store([half::shift_up(low, half::all(first)), half::shift_up(high, half::last(low))]))
     }
 
-    /// Each lane gets the number of the next one, the last lane gets `last`.
+    /// Moves the numbers down by a lane; the last lane gets `last`.
     #[inline(always)]
-    pub fn before(self, last: f32) -> Self {
+    pub fn shift_down(self, last: f32) -> Self {
         let [low, high] = load(&self.0);
-        Self(store([half::before(low, high), half::before(high, half::all(last))]))
+        Self(store([half::shift_down(low, high), half::shift_down(high, half::all(last))]))
     }
 
     /// The smaller number in each lane.
@@ -171,10 +171,10 @@ mod half {
         or(a, b) = _mm_or_ps(a, b);
         choose(mask, set, clear) = _mm_or_ps(_mm_and_ps(mask, set), _mm_andnot_ps(mask, clear));
         last(a) = _mm_shuffle_ps::<0b11_11_11_11>(a, a);
-        behind(a, first) = _mm_move_ss(_mm_shuffle_ps::<0b10_01_00_00>(a, a), first);
-        before(a, next) = {
-            let turned = _mm_move_ss(a, next);
-            _mm_shuffle_ps::<0b00_11_10_01>(turned, turned)
+        shift_up(a, first) = _mm_move_ss(_mm_shuffle_ps::<0b10_01_00_00>(a, a), first);
+        shift_down(a, next) = {
+            let replaced = _mm_move_ss(a, next);
+            _mm_shuffle_ps::<0b00_11_10_01>(replaced, replaced)
         };
     }
 
@@ -264,12 +264,12 @@ mod half {
     }
 
     #[inline(always)]
-    pub fn behind(a: Half, first: Half) -> Half {
+    pub fn shift_up(a: Half, first: Half) -> Half {
         [first[0], a[0], a[1], a[2]]
     }
 
     #[inline(always)]
-    pub fn before(a: Half, next: Half) -> Half {
+    pub fn shift_down(a: Half, next: Half) -> Half {
         [a[1], a[2], a[3], next[0]]
     }
 
@@ -317,8 +317,8 @@ mod tests {
         assert_eq!(a.is_less(b).bits(), 0b111);
         assert_eq!((a.is_less(b) & Lanes::all(0.0).is_less(a)).bits(), 0b110);
         assert_eq!((a.is_less(b) | b.is_less(a)).bits(), 0b1111_0111);
-        assert_eq!(a.behind(9.0).0, [9.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
-        assert_eq!(a.before(9.0).0, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 9.0]);
+        assert_eq!(a.shift_up(9.0).0, [9.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(a.shift_down(9.0).0, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 9.0]);
         let numbers: Vec<f32> = (0..16u8).map(f32::from).collect();
         let [first, second] =
             Lanes::pairs(std::array::from_fn(|lane| numbers[14 - lane..].first_chunk().unwrap()));

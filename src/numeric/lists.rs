@@ -1,6 +1,6 @@
 //! Lists that keep their memory while their contents are replaced.
 
-/// Makes a list of so many copies of a value.
+/// Replaces the contents of a list by `len` copies of a value.
 pub fn reset<T: Clone>(list: &mut Vec<T>, len: usize, value: T) {
     list.clear();
     list.resize(len, value);
@@ -12,14 +12,14 @@ pub fn refill<T>(list: &mut Vec<T>, items: impl IntoIterator<Item = T>) {
     list.extend(items);
 }
 
-/// Divides each of some lists at an index, or at its end if that comes first: lists of scalars that a liquid does not have are empty.
+/// Splits each list at an index, or at its end if it is shorter: lists of scalars that a liquid lacks are empty.
 pub fn split_each<T, const N: usize>(lists: [&mut [T]; N], at: usize) -> [[&mut [T]; N]; 2] {
-    let mut behind = [(); N].map(|()| Default::default());
-    let mut ends = behind.iter_mut();
-    let before = lists.map(|list| {
-        let (before, end) = list.split_at_mut(at.min(list.len()));
-        *ends.next().expect("as many") = end;
-        before
+    let mut tails = [(); N].map(|()| Default::default());
+    let mut slots = tails.iter_mut();
+    let heads = lists.map(|list| {
+        let (head, tail) = list.split_at_mut(at.min(list.len()));
+        *slots.next().expect("one tail per list") = tail;
+        head
     });
-    [before, behind]
+    [heads, tails]
 }

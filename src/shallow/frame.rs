@@ -36,7 +36,7 @@ pub(super) fn check_length(dt: f64) -> Result<()> {
 /// The error for a length (s) of a frame or a step that is out of range.
 fn out_of_range(noun: &str, length: f64) -> Error {
     let (min, max) = LENGTHS.into_inner();
-    let [min, max] = [min, max].map(digits::end);
+    let [min, max] = [min, max].map(digits::bound);
     Error::argument(format!("a {noun} of {} s is not within {min} to {max} s", digits::given(length)))
 }
 

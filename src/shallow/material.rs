@@ -76,7 +76,7 @@ impl Liquid {
             if (low..=high).contains(&value) {
                 return Ok(());
             }
-            let (value, low, high) = (digits::given(value), digits::end(low), digits::end(high));
+            let (value, low, high) = (digits::given(value), digits::bound(low), digits::bound(high));
             Err(Error::argument(format!("{name} = {value} is not within {low} to {high}")))
         };
         check("viscosity", self.viscosity, 0.0, 1e6)?;

@@ -50,8 +50,8 @@ impl Tracker {
     }
 
     /// Unpacked size (bytes) of a saved state; 0 if it is invalid.
-    pub fn unpacked(bytes: &[u8]) -> u64 {
-        packed::unpacked(bytes, MAGIC, NOUN)
+    pub fn unpacked_size(bytes: &[u8]) -> u64 {
+        packed::unpacked_size(bytes, MAGIC, NOUN)
     }
 
     /// Resumes from a state that [`Tracker::save`] wrote; `mesh` is the initial mesh.

@@ -7,7 +7,7 @@ pub(super) mod ffi {
         x: i32,
         y: i32,
         z: i32,
-        /// 1 when `values` and `mask` are set; otherwise the tile below is valid.
+        /// Whether `values` and `mask` are set; otherwise the fields of the tile are.
         is_leaf: bool,
         tile_active: bool,
         /// For floats, the first number.
@@ -58,7 +58,7 @@ pub(super) mod ffi {
         name: String,
         /// Its type, as `kind` of `vdb/points.rs` numbers it.
         kind: i32,
-        /// Whether one value stands for all points.
+        /// Whether all points share one value.
         uniform: bool,
         /// Address of the values.
         address: usize,

@@ -10,14 +10,14 @@ use crate::numeric::blocks::VOXELS;
 /// Number of leaves that are sampled.
 const LEAVES: usize = 512;
 /// Minimum number of edges between inside and outside voxels for a verdict.
-const ENOUGH: usize = 64;
+const MIN_EDGES: usize = 64;
 /// Valid range of the median slope (difference over length) along such edges. For distances it is 0.67 to 1, depending on the orientation
 /// of the surface.
 const SLOPES: [f64; 2] = [0.4, 1.6];
 /// The same for distances in voxels.
 const IN_VOXELS: [f64; 2] = [0.5, 1.1];
 /// Minimum width of the band on each side (cells): with less, no tool measures or moves the surface correctly.
-const LEAST_BAND: f64 = 1.9;
+const MIN_BAND: f64 = 1.9;
 /// Width of the rebuilt band on each side (cells).
 const BAND: f32 = 3.0;
 
@@ -34,7 +34,7 @@ enum Fault {
 
 impl Fault {
     /// Its description, to be appended to the grid's name.
-    fn words(self) -> String {
+    fn description(self) -> String {
         match self {
             Self::InVoxels => "has distances in voxels, not in metres".to_string(),
             Self::Slope(slope) => format!(
@@ -54,7 +54,7 @@ impl Fault {
 /// # Errors
 /// What OpenVDB reports.
 pub fn warning(grid: &FloatGrid) -> Result<Option<String>> {
-    Ok(fault(grid)?.map(Fault::words))
+    Ok(fault(grid)?.map(Fault::description))
 }
 
 /// A level set as it was read or, where its values are in voxels or end within two cells of the surface, one with distances in metres in a
@@ -65,7 +65,7 @@ pub fn warning(grid: &FloatGrid) -> Result<Option<String>> {
 /// Cancel, or what OpenVDB reports.
 pub fn mended(ctx: &Context, grid: FloatGrid) -> Result<(FloatGrid, Option<String>)> {
     let Some(fault) = fault(&grid)? else { return Ok((grid, None)) };
-    let what = fault.words();
+    let what = fault.description();
     if let Fault::Slope(_) = fault {
         return Ok((grid, Some(what)));
     }
@@ -93,7 +93,7 @@ fn fault(grid: &FloatGrid) -> Result<Option<Fault>> {
     let leaves = grid.leaves()?;
     let step = leaves.len().div_ceil(LEAVES).max(1);
     let mut slopes: Vec<f64> = leaves.iter().step_by(step).flat_map(differences).collect();
-    if slopes.len() < ENOUGH {
+    if slopes.len() < MIN_EDGES {
         return Ok(None);
     }
     let middle = slopes.len() / 2;
@@ -104,7 +104,7 @@ fn fault(grid: &FloatGrid) -> Result<Option<Fault>> {
         return Ok(Some(if is_in_voxels { Fault::InVoxels } else { Fault::Slope(slope) }));
     }
     let band = f64::from(grid.background().abs()) / voxel;
-    Ok((band < LEAST_BAND).then_some(Fault::Thin(band)))
+    Ok((band < MIN_BAND).then_some(Fault::Thin(band)))
 }
 
 /// Differences between the values of adjacent voxels, one inside and one outside, in a leaf.
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn distances_stay_and_others_are_measured_anew() {
+    fn distances_stay_and_other_values_are_rebuilt() {
         let ctx = Context::new(Pool::new(2).unwrap());
         let volume = 4.0 / 3.0 * std::f64::consts::PI * 0.125;
         let (same, what) = mended(&ctx, ball(&ctx, 1.0, 3.0)).unwrap();

@@ -24,7 +24,7 @@ pub fn write(path: &Path, grids: &[&FloatGrid], options: &WriteOptions) -> Resul
 /// As [`write()`], for grids of any kind.
 ///
 /// # Errors
-/// As there.
+/// As [`write()`].
 pub fn write_any(path: &Path, grids: &[GridRef<'_>], options: &WriteOptions) -> Result<()> {
     crate::io::files::atomic::write_bytes(path, &any_to_bytes(grids, options)?)
 }
@@ -41,7 +41,7 @@ pub fn to_bytes(grids: &[&FloatGrid], options: &WriteOptions) -> Result<Vec<u8>>
 /// As [`to_bytes`], for grids of any kind.
 ///
 /// # Errors
-/// As there.
+/// As [`to_bytes`].
 pub fn any_to_bytes(grids: &[GridRef<'_>], options: &WriteOptions) -> Result<Vec<u8>> {
     let (pointers, vectors): (Vec<usize>, Vec<bool>) = grids.iter().map(GridRef::address).unzip();
     for (grid, (&address, &vectors)) in grids.iter().zip(pointers.iter().zip(&vectors)) {

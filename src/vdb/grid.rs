@@ -6,7 +6,7 @@ use cxx::UniquePtr;
 
 use super::bridge::ffi;
 use super::leaf::{Leaf, LeafMut, Probe, lend, lend_mut};
-use super::{alone, call, fail};
+use super::{call, fail, uncancellable_call};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
@@ -85,10 +85,10 @@ pub struct Tile {
     pub active: bool,
 }
 
-/// Blocks with allocated memory, ready to be put into a grid.
-pub struct Ready(UniquePtr<ffi::Blocks>);
+/// Blocks copied into leaves, ready to be put into a grid without further allocation of leaves.
+pub struct PreparedBlocks(UniquePtr<ffi::Blocks>);
 
-impl Ready {
+impl PreparedBlocks {
     /// Copies blocks into leaves.
     ///
     /// # Errors
@@ -326,14 +326,14 @@ impl FloatGrid {
     /// # Errors
     /// When memory runs out; the grid is then unchanged.
     pub fn replace_blocks(&mut self, ctx: &Context, edits: &[BlockEdit]) -> Result<()> {
-        self.put(Ready::new(ctx, edits)?)
+        self.put(PreparedBlocks::new(ctx, edits)?)
     }
 
     /// Replaces leaves or tiles by blocks.
     ///
     /// # Errors
     /// When memory for the nodes above leaves runs out.
-    pub fn put(&mut self, mut blocks: Ready) -> Result<()> {
+    pub fn put(&mut self, mut blocks: PreparedBlocks) -> Result<()> {
         ffi::put_blocks(self.inner.pin_mut(), blocks.0.pin_mut()).map_err(fail)
     }
 
@@ -376,7 +376,7 @@ impl FloatGrid {
     /// # Errors
     /// When memory runs out.
     pub fn prune(&mut self, tolerance: f32) -> Result<()> {
-        ffi::prune(self.inner.pin_mut(), &alone(), false, tolerance).map_err(fail)
+        ffi::prune(self.inner.pin_mut(), &uncancellable_call(), false, tolerance).map_err(fail)
     }
 
     /// Replaces inactive parts of a level set by inside and outside tiles.
@@ -384,7 +384,7 @@ impl FloatGrid {
     /// # Errors
     /// When memory runs out.
     pub fn prune_level_set(&mut self) -> Result<()> {
-        ffi::prune(self.inner.pin_mut(), &alone(), true, 0.0).map_err(fail)
+        ffi::prune(self.inner.pin_mut(), &uncancellable_call(), true, 0.0).map_err(fail)
     }
 
     /// Gives everything outside the band the sign of the adjacent band.
@@ -392,7 +392,7 @@ impl FloatGrid {
     /// # Errors
     /// When memory runs out.
     pub fn flood_fill(&mut self) -> Result<()> {
-        ffi::flood_fill(self.inner.pin_mut(), &alone()).map_err(fail)
+        ffi::flood_fill(self.inner.pin_mut(), &uncancellable_call()).map_err(fail)
     }
 
     /// Activates the voxels that share a face with an active one; their values do not change.
@@ -400,7 +400,7 @@ impl FloatGrid {
     /// # Errors
     /// What OpenVDB reports.
     pub(super) fn dilate(&mut self) -> Result<()> {
-        ffi::dilate(self.inner.pin_mut(), &alone()).map_err(fail)
+        ffi::dilate(self.inner.pin_mut(), &uncancellable_call()).map_err(fail)
     }
 }
 

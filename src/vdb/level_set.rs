@@ -120,7 +120,7 @@ enum Operation {
     Intersection,
 }
 
-fn same_lattice(a: &FloatGrid, b: &FloatGrid) -> Result<()> {
+fn check_same_lattice(a: &FloatGrid, b: &FloatGrid) -> Result<()> {
     let (cell_a, cell_b) = (a.voxel_size(), b.voxel_size());
     if (cell_a - cell_b).abs() > 1e-9 * cell_a.max(cell_b) {
         let what =
@@ -129,21 +129,21 @@ fn same_lattice(a: &FloatGrid, b: &FloatGrid) -> Result<()> {
     }
     // A cell's corner and its neighbours along the axes determine an affine map.
     let positions = [DVec3::zeros(), DVec3::x(), DVec3::y(), DVec3::z()];
-    let apart = |position: DVec3| (a.index_to_world(position) - b.index_to_world(position)).amax();
-    if positions.into_iter().map(apart).fold(0.0, f64::max) > 1e-6 * cell_a {
+    let distance = |position: DVec3| (a.index_to_world(position) - b.index_to_world(position)).amax();
+    if positions.into_iter().map(distance).fold(0.0, f64::max) > 1e-6 * cell_a {
         return Err(Error::argument("the level sets' cells are shifted or turned against each other"));
     }
     Ok(())
 }
 
 fn csg(ctx: &Context, a: &mut FloatGrid, mut b: FloatGrid, operation: Operation) -> Result<()> {
-    same_lattice(a, &b)?;
+    check_same_lattice(a, &b)?;
     let (call, _running) = call(ctx);
     ffi::csg(a.inner.pin_mut(), b.inner.pin_mut(), &call, operation as i32).map_err(fail)
 }
 
 fn csg_copy(ctx: &Context, a: &FloatGrid, b: &FloatGrid, operation: Operation) -> Result<FloatGrid> {
-    same_lattice(a, b)?;
+    check_same_lattice(a, b)?;
     let (call, _running) = call(ctx);
     let inner = ffi::csg_copy(&a.inner, &b.inner, &call, operation as i32).map_err(fail)?;
     Ok(FloatGrid { inner })

@@ -17,7 +17,7 @@ mod refusal;
 mod vectors;
 pub(crate) mod write_options;
 
-pub use grid::{FloatGrid, GridClass, MetaValue, Ready, Tile};
+pub use grid::{FloatGrid, GridClass, MetaValue, PreparedBlocks, Tile};
 pub use leaf::{Leaf, LeafMut, Probe, Vectors};
 pub use vectors::{AnyGrid, GridRef, VectorEdit, VectorGrid, VectorLeaf, VectorProbe};
 
@@ -45,6 +45,6 @@ pub fn end_workers() {
 }
 
 /// A call on the caller's thread that cannot be cancelled.
-fn alone() -> bridge::ffi::Call {
+fn uncancellable_call() -> bridge::ffi::Call {
     bridge::ffi::Call { threads: 1, cancel: 0 }
 }

@@ -4,14 +4,14 @@ use std::path::Path;
 
 use cxx::UniquePtr;
 
-use super::alone;
 use super::bridge::ffi;
 use super::refusal::cannot_read;
+use super::uncancellable_call;
 use crate::geometry::DVec3;
 use crate::geometry::points::{Attribute, Column, Points, Values};
 
 /// Warns about the attributes of a file that were omitted.
-pub(in crate::vdb) fn warn_of(path: &Path, skipped: &[String]) {
+pub(in crate::vdb) fn warn_of_skipped(path: &Path, skipped: &[String]) {
     if !skipped.is_empty() {
         let list = skipped.join(", ");
         log::warn!("{}: attributes of types that are not read are left out: {list}", path.display());
@@ -19,7 +19,7 @@ pub(in crate::vdb) fn warn_of(path: &Path, skipped: &[String]) {
 }
 
 /// An attribute in the form that the C++ side takes.
-pub(in crate::vdb) fn array(attribute: &Attribute) -> ffi::PointArray {
+pub(in crate::vdb) fn to_array(attribute: &Attribute) -> ffi::PointArray {
     fn address<T: Copy>(column: &Column<T>) -> usize {
         column.stored().as_ptr() as usize
     }
@@ -53,10 +53,10 @@ pub(in crate::vdb) fn of_grid(
     grid: &UniquePtr<ffi::PointGrid>,
 ) -> std::result::Result<(Points, Vec<String>), String> {
     let fault = |error: cxx::Exception| cannot_read(&error);
-    let head = ffi::points_head(grid, &alone()).map_err(fault)?;
+    let head = ffi::points_head(grid, &uncancellable_call()).map_err(fault)?;
     let out_of_memory = || "the .vdb file is damaged, or needs more memory than it may take".to_string();
-    let mut cells = room::<[i32; 3]>(head.count).ok_or_else(out_of_memory)?;
-    ffi::point_cells(grid, &alone(), cells.as_flattened_mut()).map_err(fault)?;
+    let mut cells = zeros::<[i32; 3]>(head.count).ok_or_else(out_of_memory)?;
+    ffi::point_cells(grid, &uncancellable_call(), cells.as_flattened_mut()).map_err(fault)?;
     let mut points = Points { voxel_size: head.voxel, cells, offsets: Vec::new(), attributes: Vec::new() };
     let mut skipped = Vec::new();
     for attribute in &head.attributes {
@@ -67,10 +67,11 @@ pub(in crate::vdb) fn of_grid(
         let count = if is_position { head.count } else { count };
         macro_rules! column {
             ($type:ty, $values:expr) => {{
-                let mut values = room::<$type>(count).ok_or_else(out_of_memory)?;
+                let mut values = zeros::<$type>(count).ok_or_else(out_of_memory)?;
                 let address = values.as_mut_ptr() as usize;
                 // SAFETY: `values` has room for `count` values of the type with this number.
-                unsafe { ffi::point_values(grid, &alone(), name, *kind, address, count) }.map_err(fault)?;
+                unsafe { ffi::point_values(grid, &uncancellable_call(), name, *kind, address, count) }
+                    .map_err(fault)?;
                 $values(values)
             }};
         }
@@ -97,13 +98,13 @@ pub(in crate::vdb) fn of_grid(
     if points.offsets.len() != points.cells.len() {
         return Err("the .vdb file is damaged, or its points have no positions".into());
     }
-    position(&mut points, &head)?;
+    reassign_voxels(&mut points, &head)?;
     points.validate().map_err(|error| error.to_string())?;
     Ok((points, skipped))
 }
 
 /// Zeros, or none when memory runs out.
-fn room<T: Copy + Default>(count: usize) -> Option<Vec<T>> {
+fn zeros<T: Copy + Default>(count: usize) -> Option<Vec<T>> {
     let mut values = Vec::new();
     values.try_reserve_exact(count).ok()?;
     values.resize(count, T::default());
@@ -118,7 +119,7 @@ fn shared<T: Copy>(values: Vec<T>, uniform: bool) -> Column<T> {
 }
 
 /// Assigns positions to voxels anew, if the file has a transform other than a voxel size or stores points outside their voxels.
-fn position(points: &mut Points, head: &ffi::PointsHead) -> std::result::Result<(), String> {
+fn reassign_voxels(points: &mut Points, head: &ffi::PointsHead) -> std::result::Result<(), String> {
     if !head.is_linear {
         return Err(format!("grid \"{}\" has points in a space that is not linear", head.name));
     }
@@ -141,7 +142,7 @@ fn position(points: &mut Points, head: &ffi::PointsHead) -> std::result::Result<
         )
     };
     let positions: Vec<DVec3> = points.cells.iter().zip(&points.offsets).map(world).collect();
-    let placed = Points::at(head.voxel, &positions).map_err(|error| error.to_string())?;
-    (points.cells, points.offsets) = (placed.cells, placed.offsets);
+    let reassigned = Points::at(head.voxel, &positions).map_err(|error| error.to_string())?;
+    (points.cells, points.offsets) = (reassigned.cells, reassigned.offsets);
     Ok(())
 }

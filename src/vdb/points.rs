@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::bridge::ffi;
 use super::grid::to_meta;
-use super::point_arrays::{array, warn_of};
+use super::point_arrays::{to_array, warn_of_skipped};
 use super::reading::{decode, guard};
 use super::write_options::{WriteOptions, codec_number, named_by_content};
 use super::{call, fail};
@@ -19,14 +19,14 @@ use crate::error::{Error, Result};
 use crate::geometry::points::Points;
 
 /// Maximum number of points of a grid: OpenVDB counts those of a leaf in 32 bits, and orders are 32-bit indices.
-const MOST: usize = u32::MAX as usize;
+const MAX_POINTS: usize = u32::MAX as usize;
 
 /// The order of the points in a file, as indices into `cells`; none if they already have this order.
 ///
 /// # Errors
 /// More than 2^32 - 1 points; cancel.
 pub fn order(ctx: &Context, cells: &[[i32; 3]]) -> Result<Option<Vec<u32>>> {
-    if cells.len() > MOST {
+    if cells.len() > MAX_POINTS {
         return Err(Error::argument(format!("{} points are too many for a grid", cells.len())));
     }
     ctx.check()?;
@@ -72,7 +72,7 @@ pub fn to_bytes(ctx: &Context, name: &str, points: &Points, options: &WriteOptio
         address: points.offsets.as_ptr() as usize,
     };
     let arrays: Vec<ffi::PointArray> =
-        std::iter::once(positions).chain(points.attributes.iter().map(array)).collect();
+        std::iter::once(positions).chain(points.attributes.iter().map(to_array)).collect();
     let (call, _running) = call(ctx);
     let (cells, order) = (points.cells.as_flattened(), order.as_deref().unwrap_or_default());
     let grid =
@@ -85,7 +85,7 @@ pub fn to_bytes(ctx: &Context, name: &str, points: &Points, options: &WriteOptio
 /// Writes points to a file, atomically: see [`to_bytes`].
 ///
 /// # Errors
-/// As there, or what the operating system reports.
+/// As [`to_bytes`], or what the operating system reports.
 pub fn write(ctx: &Context, path: &Path, name: &str, points: &Points, options: &WriteOptions) -> Result<()> {
     crate::io::files::atomic::write_bytes(path, &to_bytes(ctx, name, points, options)?)
 }
@@ -113,7 +113,7 @@ pub fn read(path: &Path, name: Option<&str>) -> Result<Points> {
 /// As [`read`].
 pub fn read_own(path: &Path, name: Option<&str>) -> Result<Points> {
     let (points, skipped) = decode::read_points(path, name)?;
-    warn_of(path, &skipped);
+    warn_of_skipped(path, &skipped);
     Ok(points)
 }
 

@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_of_the_tools_become_sentences() {
+    fn texts_of_exceptions_become_sentences() {
         let said = |what: &str| error_of(what).to_string();
         let cubes =
             said("RuntimeError: The transform must have uniform scale for the LevelSetTracker to function");

@@ -273,7 +273,7 @@ impl Solid {
             // Rounding may let a line pass by a thin triangle, but not in all directions.
             let tree = tree.get_or_insert_with(|| Bvh::new(mesh));
             let is_right = |way: &DVec3| {
-                tree.surrounding(position, *way) == i32::from(self.tree.surrounding(position, *way) > 0)
+                tree.winding_number(position, *way) == i32::from(self.tree.winding_number(position, *way) > 0)
             };
             if ASLANT.iter().any(is_right) {
                 return None;

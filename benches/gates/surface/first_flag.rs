@@ -3,7 +3,7 @@
 
 use frazil::Context;
 use frazil::geometry::TriMesh;
-use frazil::geometry::check::topology::bodies;
+use frazil::geometry::check::topology::components;
 use frazil::surface::{Params, Tracker};
 
 use crate::common::liquids::{context, numbered, own_surface};
@@ -40,7 +40,7 @@ fn frames(ctx: &Context, set: &Set) -> (Option<usize>, Option<usize>) {
             set.positions.iter().map(|position| (set.motion)(*position, frame as f64) * SPACING).collect(),
         )
     };
-    let kind = |surface: &TriMesh| (bodies(&surface.triangles).len(), surface.euler_characteristic());
+    let kind = |surface: &TriMesh| (components(&surface.triangles).len(), surface.euler_characteristic());
     let first = own_surface(ctx, &at(0).positions, SPACING);
     let begin = kind(&first);
     let mut tracker = Tracker::new(ctx, Params::for_spacing(SPACING), &first, &at(0)).expect("a tracker");

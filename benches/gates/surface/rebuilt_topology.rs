@@ -1,7 +1,7 @@
 //! Gates of the made sets, whose mesh is rebuilt: whether it becomes what the liquid does, how soon, and whether what its changes say
 //! of themselves is so; and whether it is valid, and becomes that too, where its topology is matched all over it in every step.
 
-use frazil::geometry::check::topology::bodies;
+use frazil::geometry::check::topology::components;
 use frazil::geometry::mesh::attributes::{Number, On};
 use frazil::geometry::{DetailedMesh, MeshArray, TriMesh};
 use frazil::mesh_repair::carry_attributes;
@@ -41,7 +41,7 @@ const TRUTH: [Kind; 4] = [solid(1), solid(12), solid(841), solid(1)];
 
 impl Kind {
     fn of(mesh: &TriMesh) -> Self {
-        let parts = bodies(&mesh.triangles);
+        let parts = components(&mesh.triangles);
         let solids = parts.iter().filter(|part| part_volume(mesh, part) > 0.0).count();
         let handles = parts.len() as i64 - mesh.euler_characteristic() / 2;
         Self { bodies: solids, cavities: parts.len() - solids, handles }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use frazil::Context;
-use frazil::geometry::check::topology::bodies;
+use frazil::geometry::check::topology::components;
 use frazil::geometry::mesh::attributes::{MeshArray, Number, On};
 use frazil::geometry::{DVec3, DetailedMesh, TriMesh, Uvs};
 use frazil::io::mesh;
@@ -119,7 +119,7 @@ impl Spot {
     /// Whether the particles' own surface merges or splits between a frame and the one before.
     fn changes(&self, ctx: &Context, frame: i32) -> bool {
         let [before, now] = [frame - 1, frame].map(|frame| self.phi(ctx, frame, 0.5));
-        let kind = |surface: &TriMesh| (bodies(&surface.triangles).len(), surface.euler_characteristic());
+        let kind = |surface: &TriMesh| (components(&surface.triangles).len(), surface.euler_characteristic());
         let [from, to] = [frame - 1, frame].map(|frame| self.particles(frame));
         let mut own = Tracker::new(ctx, Params::for_spacing(SPACING), &before, &from).expect("a tracker");
         let report = own.step(ctx, &from, &to, 1.0 / FPS).expect("a step");

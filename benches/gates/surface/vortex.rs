@@ -4,7 +4,7 @@
 use std::time::Instant;
 
 use frazil::geometry::check::deviation::{NearestTree, from_surface};
-use frazil::geometry::check::topology::bodies;
+use frazil::geometry::check::topology::components;
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::surface::{Params, Particles, Tracker};
 
@@ -107,7 +107,7 @@ fn rebuilt() -> [(f64, String); 2] {
                 "# vortex, rebuilt, frame {frame}: {:.2} % lost, {} triangles in {} bodies, {cells} cells flagged, {:.0} s",
                 lost(&tracker.mesh()),
                 tracker.triangles().len(),
-                bodies(tracker.triangles()).len(),
+                components(tracker.triangles()).len(),
                 start.elapsed().as_secs_f64()
             );
         }
@@ -124,7 +124,7 @@ fn rebuilt() -> [(f64, String); 2] {
         from.positions.len(),
         first.triangles.len(),
         last.triangles.len(),
-        bodies(&last.triangles).len(),
+        components(&last.triangles).len(),
         start.elapsed().as_secs_f64()
     );
     let gone = lost(&last);

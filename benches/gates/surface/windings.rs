@@ -1,6 +1,6 @@
 //! How often a closed mesh surrounds positions: on a lattice by the crossings of its lines, and of particles by rays.
 
-use frazil::geometry::check::topology::bodies;
+use frazil::geometry::check::topology::components;
 use frazil::geometry::spatial::bvh::Bvh;
 use frazil::geometry::{DVec3, TriMesh, Vec3};
 use rayon::prelude::*;
@@ -96,14 +96,14 @@ fn astray(mesh: &TriMesh, step: f64) -> Option<Vec<Vec3>> {
 /// How many of some places (m) a closed mesh surrounds once.
 pub fn inside(mesh: &TriMesh, positions: &[DVec3]) -> usize {
     let tree = Bvh::new(mesh);
-    let is_inside = |position: &&DVec3| ASLANT.iter().any(|way| tree.surrounding(**position, *way) == 1);
+    let is_inside = |position: &&DVec3| ASLANT.iter().any(|way| tree.winding_number(**position, *way) == 1);
     positions.par_iter().filter(is_inside).count()
 }
 
 /// How many parts of a closed mesh with a volume over 0 surround none of some places (m).
 pub fn empty_parts(mesh: &TriMesh, positions: &[DVec3]) -> usize {
     let is_empty = |part: &&Vec<u32>| part_volume(mesh, part) > 0.0 && !surrounds(mesh, part, positions);
-    bodies(&mesh.triangles).par_iter().filter(is_empty).count()
+    components(&mesh.triangles).par_iter().filter(is_empty).count()
 }
 
 /// Whether a part of a mesh, with these triangles, surrounds any of some places (m).
@@ -117,7 +117,7 @@ fn surrounds(mesh: &TriMesh, part: &[u32], places: &[DVec3]) -> bool {
     places.iter().any(|place| {
         let at: Vec3 = place.cast();
         (0..3).all(|axis| (low[axis]..=high[axis]).contains(&at[axis]))
-            && ASLANT.iter().any(|way| tree.surrounding(*place, *way) > 0)
+            && ASLANT.iter().any(|way| tree.winding_number(*place, *way) > 0)
     })
 }
 

@@ -243,7 +243,7 @@ pub(in crate::capi) fn within(name: &str, value: f64, range: RangeInclusive<f64>
     finite(name, value)?;
     refuse(!range.contains(&value), || {
         let (low, high) = range.into_inner();
-        let (value, low, high) = (digits::given(value), digits::end(low), digits::end(high));
+        let (value, low, high) = (digits::given(value), digits::bound(low), digits::bound(high));
         format!("{name} = {value} is not within {low} to {high}{unit}")
     })
 }

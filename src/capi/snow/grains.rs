@@ -90,7 +90,7 @@ impl GrainsHandle {
             let params = given_or_defaults(params)?;
             let own = params.params()?;
             let new = || Ok(Grains::new(own)?);
-            let grains = new_or_resumed(ctx, "grains", restart, new, Grains::unpacked, |state| {
+            let grains = new_or_resumed(ctx, "grains", restart, new, Grains::unpacked_size, |state| {
                 Grains::resume(own, state)
             })?;
             Ok(Self { grains, ground: params.ground(), shapes: Shapes::new(), saved: Saved::default() })
@@ -151,7 +151,7 @@ fn check_size(radius: f64, voxel: f64) -> Outcome {
     let [low, high] = RADII.map(|part| part * voxel);
     if radius < low || radius > high {
         let [radius, voxel] = [radius, voxel].map(digits::given);
-        let [low, high] = [low, high].map(digits::end);
+        let [low, high] = [low, high].map(digits::bound);
         let text = format!(
             "radius = {radius} is not within {low} to {high} m, as the base layer's voxels of {voxel} m want it"
         );

@@ -86,7 +86,7 @@ impl MistHandle {
             let params = given_or_defaults(params)?;
             let own = params.params()?;
             let new = || Ok(Mist::new(own.clone())?);
-            let mist = new_or_resumed(ctx, "mist", restart, new, Mist::unpacked, |state| {
+            let mist = new_or_resumed(ctx, "mist", restart, new, Mist::unpacked_size, |state| {
                 Mist::resume(own.clone(), state)
             })?;
             Ok(Self { mist, floor: params.ground(), shapes: Shapes::new(), saved: Saved::default() })

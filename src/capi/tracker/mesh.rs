@@ -131,7 +131,7 @@ impl TrackerHandle {
         let resume = |state: &[u8]| Tracker::resume(params, triangles, state);
         // SAFETY: as above.
         let mut tracker =
-            unsafe { new_or_resumed(ctx, "a tracker", restart, new, Tracker::unpacked, resume) }?;
+            unsafe { new_or_resumed(ctx, "a tracker", restart, new, Tracker::unpacked_size, resume) }?;
         if params.rebuild && !restart.0.is_null() {
             check_closed(&tracker)?;
         }

@@ -104,7 +104,7 @@ fn report(path: &Path, mesh: &TriMesh, faults: &Faults, bodies: &[Body]) -> Valu
         "genus": faults.genus,
         "holes": faults.holes,
         "open_edges": faults.open_edges,
-        "crowded_edges": faults.crowded_edges,
+        "crowded_edges": faults.non_manifold_edges,
         "turned_edges": faults.turned_edges,
         "non_manifold_vertices": faults.non_manifold_vertices,
         "embedded": faults.is_embedded(),
@@ -129,7 +129,7 @@ fn by_index(topology: &Topology) -> Value {
     json!({
         "watertight": topology.is_watertight(),
         "open_edges": topology.open_edges,
-        "crowded_edges": topology.crowded_edges,
+        "crowded_edges": topology.non_manifold_edges,
         "turned_edges": topology.turned_edges,
         "non_manifold_vertices": topology.non_manifold_vertices,
         "collapsed_triangles": topology.collapsed_triangles,
@@ -189,7 +189,7 @@ fn bodies(mesh: &TriMesh) -> Vec<TriMesh> {
             triangles: corners.iter().map(|corners| corners.map(number)).collect(),
         }
     };
-    topology::bodies(&triangles).into_iter().map(component).collect()
+    topology::components(&triangles).into_iter().map(component).collect()
 }
 
 /// The nouns of faults, singular and plural.
@@ -283,7 +283,7 @@ fn in_words(path: &Path, mesh: &TriMesh, faults: &Faults, bodies: &[Body]) -> St
     out += &format!("area {area:.6} m2, volume {volume:.6} m3\n");
     out += &bodies_in_words(bodies);
     let joined_counts =
-        [faults.open_edges, faults.crowded_edges, faults.turned_edges, faults.non_manifold_vertices];
+        [faults.open_edges, faults.non_manifold_edges, faults.turned_edges, faults.non_manifold_vertices];
     let triangles = [
         faults.crossings,
         faults.corner_crossings,
@@ -301,8 +301,12 @@ fn in_words(path: &Path, mesh: &TriMesh, faults: &Faults, bodies: &[Body]) -> St
     let all = parts.chain(joined_counts.into_iter().zip(JOINED)).chain(triangles.into_iter().zip(TRIANGLES));
     out.extend(all.filter(|(count, _)| *count > 0).map(|(count, nouns)| count_line(count, nouns)));
     // Faults hidden by joining vertices by position.
-    let as_it_is =
-        [by_index.open_edges, by_index.crowded_edges, by_index.turned_edges, by_index.non_manifold_vertices];
+    let as_it_is = [
+        by_index.open_edges,
+        by_index.non_manifold_edges,
+        by_index.turned_edges,
+        by_index.non_manifold_vertices,
+    ];
     for ((count, joined), nouns) in as_it_is.into_iter().zip(joined_counts).zip(JOINED) {
         if count > 0 && count != joined {
             out += &format!("  {count:>8} {}, by the vertices' indices\n", noun(count, nouns));

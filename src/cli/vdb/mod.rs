@@ -14,7 +14,7 @@ use super::output;
 use super::session::{Failure, OrFailure, Session};
 use clap::{Subcommand, ValueEnum};
 use frazil::geometry::TriMesh;
-use frazil::geometry::mesh::{BY_OPTION, too_far};
+use frazil::geometry::mesh::{BY_OPTION, too_far_warning};
 use frazil::sweep::surface_bytes;
 use frazil::vdb::file::{self, Compression, WriteOptions};
 use frazil::vdb::{FloatGrid, level_set};
@@ -149,7 +149,7 @@ fn check_name(path: &Path, extensions: &[&str]) -> std::result::Result<(), Failu
 
 /// The message for a mesh so far away (m) that its file's 32-bit positions are coarse compared with a cell (m).
 fn far_mesh(path: &Path, mesh: &TriMesh, cell: f64) -> Option<String> {
-    too_far(&path.display().to_string(), mesh.farthest(), 1.0, cell, BY_OPTION)
+    too_far_warning(&path.display().to_string(), mesh.farthest(), 1.0, cell, BY_OPTION)
 }
 
 /// Refuses a level set whose surface (m2) would need too much memory with this cell (m).

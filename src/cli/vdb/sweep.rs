@@ -128,7 +128,8 @@ impl Args {
                     self.refuse_motion("a sequence", ["--move", "--turn-deg"])?;
                     let Frames { first, last } = self.frames.ok_or_else(|| needs_frames(path))?;
                     let (hashes, origin) = (Arc::default(), self.space.origin.at);
-                    let sequence = MeshSequence::open_seen(pattern, first, last, 1.0, 0.0, hashes, origin);
+                    let sequence =
+                        MeshSequence::open_with_hashes(pattern, first, last, 1.0, 0.0, hashes, origin);
                     (Box::new(sequence.or_refuse()?) as Box<dyn Motion>, first.into(), last.into())
                 }
                 None => {

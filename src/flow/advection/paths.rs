@@ -166,7 +166,7 @@ impl Displacements<'_> {
         let mut lower = own;
         for axis in 0..3 {
             let first = if self.below.is_some() { below[axis] } else { own[axis].0[0] };
-            lower[axis] = own[axis].behind(first);
+            lower[axis] = own[axis].shift_up(first);
         }
         means(own, lower)
     }

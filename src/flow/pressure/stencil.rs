@@ -228,8 +228,8 @@ fn around(near: &Near<'_>, row: usize, own: Lanes) -> [Lanes; 6] {
     let right = pick(x < 7, row + 8, high_x, row.wrapping_sub(56));
     let down = pick(y > 0, row.wrapping_sub(1), low_y, row + 7);
     let up = pick(y < 7, row + 1, high_y, row.wrapping_sub(7));
-    let back = own.behind(low_z[row * 8 + 7]);
-    let front = own.before(high_z[row * 8]);
+    let back = own.shift_up(low_z[row * 8 + 7]);
+    let front = own.shift_down(high_z[row * 8]);
     [left, right, down, up, back, front]
 }
 

@@ -9,8 +9,8 @@ use crate::geometry::{DVec3, TriMesh, Vec3};
 const LEAF: usize = 4;
 /// Points, triangles or leaves per task.
 const GRAIN: usize = 1024;
-/// Maximum nodes that wait during a search: one for each level, of which there are at most 30.
-const WAITING: usize = 64;
+/// Size of the stack of a search, which has at most one pending node for each of at most 30 levels.
+const STACK: usize = 64;
 /// A triangle whose first corner has a smaller sine is degenerate: its edges are searched instead, which lie within this fraction of its
 /// length.
 const NEEDLE: f64 = 1e-8;
@@ -20,13 +20,13 @@ const ROUNDING: f64 = 1e-12;
 /// Weights of a triangle's centre and of each corner, as shares of its area: exact for quadratic integrands.
 const CENTRE: f64 = 0.75;
 const CORNER: f64 = 1.0 / 12.0;
-/// Fraction of the points that lie within [`Deviation::p95`].
-const MOST: f64 = 0.95;
+/// Fraction of the weight of the points that lie within [`Deviation::p95`].
+const PERCENTILE: f64 = 0.95;
 
 /// Minimum and maximum corner of a box (m).
 type Span = (Vec3, Vec3);
 /// The empty box.
-const NOWHERE: Span = (Vec3::new(FAR, FAR, FAR), Vec3::new(-FAR, -FAR, -FAR));
+const EMPTY: Span = (Vec3::new(FAR, FAR, FAR), Vec3::new(-FAR, -FAR, -FAR));
 const FAR: f32 = f32::INFINITY;
 /// Centre of a triangle (m), and its index.
 type Item = (Vec3, u32);
@@ -56,22 +56,22 @@ pub fn from_surface(mesh: &TriMesh, to: &NearestTree) -> Option<Deviation> {
 /// with equal weights; `None` without triangles.
 pub fn from_vertices(mesh: &TriMesh, to: &TriMesh) -> Option<Deviation> {
     let pairs = mesh.positions.iter().zip(&to.positions);
-    let far = pairs.map(|(from, to)| {
+    let distances = pairs.map(|(from, to)| {
         let (from, to) = (from.cast::<f64>(), to.cast::<f64>());
         (from, (to - from).norm())
     });
-    Deviation::of(&of_vertices(mesh, far))
+    Deviation::of(&vertex_samples(mesh, distances))
 }
 
 /// Lengths of the second differences of each vertex position, x(n - 1) - 2 x(n) + x(n + 1), over three frames of meshes with the same
 /// triangles: 0 where a vertex moves uniformly. Only vertices that triangles use count, with equal weights; `None` without triangles.
 pub fn second_differences([before, here, after]: [&TriMesh; 3]) -> Option<Deviation> {
     let positions = before.positions.iter().zip(&here.positions).zip(&after.positions);
-    let far = positions.map(|((before, here), after)| {
+    let differences = positions.map(|((before, here), after)| {
         let [before, here, after] = [before, here, after].map(|position| position.cast::<f64>());
         (here, (before - here * 2.0 + after).norm())
     });
-    Deviation::of(&of_vertices(here, far))
+    Deviation::of(&vertex_samples(here, differences))
 }
 
 /// A point (m) with its distance (m).
@@ -98,7 +98,7 @@ impl Deviation {
         let mut within = 0.0;
         let last = order.iter().find(|(_, weight)| {
             within += weight;
-            within >= MOST * total
+            within >= PERCENTILE * total
         });
         let max = farthest.distance;
         // Rounding may lift the mean of equal numbers above them.
@@ -107,12 +107,12 @@ impl Deviation {
     }
 }
 
-/// The vertices that triangles use, out of all with their distances (m).
-fn of_vertices(mesh: &TriMesh, far: impl Iterator<Item = (DVec3, f64)>) -> Vec<Sample> {
-    let mut named = vec![false; mesh.positions.len()];
-    mesh.triangles.as_flattened().iter().for_each(|&vertex| named[vertex as usize] = true);
-    let of_named = far.zip(named).filter(|(_, named)| *named);
-    of_named.map(|((at, distance), _)| Sample { at, distance, weight: 1.0 }).collect()
+/// The vertices that triangles use; `distances` has the position and the distance (m) of every vertex.
+fn vertex_samples(mesh: &TriMesh, distances: impl Iterator<Item = (DVec3, f64)>) -> Vec<Sample> {
+    let mut is_used = vec![false; mesh.positions.len()];
+    mesh.triangles.as_flattened().iter().for_each(|&vertex| is_used[vertex as usize] = true);
+    let used = distances.zip(is_used).filter(|(_, is_used)| *is_used);
+    used.map(|((at, distance), _)| Sample { at, distance, weight: 1.0 }).collect()
 }
 
 /// The points of a mesh (m), each with the area (m2) that it represents: the vertices that triangles use, then the centres.
@@ -154,10 +154,11 @@ pub struct Nearest {
     pub triangle: usize,
 }
 
-/// A position on a facet, with the square of its distance (m2).
+/// The position on a facet that is nearest to a point.
 #[derive(Clone, Copy)]
-pub(in crate::geometry) struct Found {
+pub(in crate::geometry) struct FacetPoint {
     position: DVec3,
+    /// Squared distance (m2).
     pub(in crate::geometry) square: f64,
     facet: usize,
 }
@@ -185,9 +186,9 @@ impl NearestTree {
         let around = |leaf: usize| {
             let facets = &facets[starts(count, levels, leaf)..starts(count, levels, leaf + 1)];
             let corners = facets.iter().flat_map(|facet| &facet.corners);
-            corners.fold(NOWHERE, |(low, high), corner| (low.inf(corner), high.sup(corner)))
+            corners.fold(EMPTY, |(low, high), corner| (low.inf(corner), high.sup(corner)))
         };
-        let mut boxes = vec![NOWHERE; leaves - 1];
+        let mut boxes = vec![EMPTY; leaves - 1];
         boxes.par_extend((0..leaves).into_par_iter().with_min_len(GRAIN).map(around));
         for node in (0..leaves - 1).rev() {
             let [one, two] = [boxes[2 * node + 1], boxes[2 * node + 2]];
@@ -216,38 +217,38 @@ impl NearestTree {
         points.iter().filter_map(sample).collect()
     }
 
-    fn distance(&self, from: DVec3, to: &Found) -> f64 {
+    fn distance(&self, from: DVec3, to: &FacetPoint) -> f64 {
         let distance = to.square.sqrt();
         if distance <= ROUNDING * self.reach.max(from.amax()) { 0.0 } else { distance }
     }
 
-    /// The nearest position; faster with the number of a facet that is probably near.
-    fn search(&self, point: DVec3, guess: Option<usize>) -> Option<Found> {
-        let mut best = guess.map(|facet| self.facets[facet].found(point, facet));
+    /// The nearest position; `guess` is the index of a facet that is probably near, for speed.
+    fn search(&self, point: DVec3, guess: Option<usize>) -> Option<FacetPoint> {
+        let mut best = guess.map(|facet| self.facets[facet].nearest(point, facet));
         let mut bound = best.map_or(f64::INFINITY, |found| found.square);
-        let node = |index: usize| (square_to(&self.boxes[index], point), index);
+        let node = |index: usize| (squared_distance_to(&self.boxes[index], point), index);
         let first_leaf = (1usize << self.levels) - 1;
-        let mut waiting = [(0.0, 0usize); WAITING];
-        waiting[0] = node(0);
+        let mut stack = [(0.0, 0usize); STACK];
+        stack[0] = node(0);
         let mut count = 1;
         while count > 0 {
             count -= 1;
-            let (square, index) = waiting[count];
+            let (square, index) = stack[count];
             if square >= bound {
                 continue;
             }
             if index < first_leaf {
                 let (one, two) = (node(2 * index + 1), node(2 * index + 2));
                 let (near, far) = if two.0 < one.0 { (two, one) } else { (one, two) };
-                waiting[count] = far;
-                waiting[count + 1] = near;
+                stack[count] = far;
+                stack[count + 1] = near;
                 count += 2;
                 continue;
             }
             let leaf = index - first_leaf;
             let [begin, end] = [leaf, leaf + 1].map(|leaf| starts(self.facets.len(), self.levels, leaf));
             for (facet, number) in self.facets[begin..end].iter().zip(begin..) {
-                let found = facet.found(point, number);
+                let found = facet.nearest(point, number);
                 if found.square < bound {
                     bound = found.square;
                     best = Some(found);
@@ -258,18 +259,18 @@ impl NearestTree {
     }
 }
 
-/// Where the items of a node at a level start, out of `count`; its children share them evenly.
+/// Index of the first item of a node at a level, out of `count` items, which the nodes of a level share evenly.
 fn starts(count: usize, level: u32, node: usize) -> usize {
     (node * count) >> level
 }
 
-/// Sorts the items of a node at a level, out of `count`, so that each node below has its own items.
+/// Orders the items of a node so that those of each node below it are consecutive, at [`starts`].
 fn sort(items: &mut [Item], count: usize, levels: u32, level: u32, node: usize) {
     if level == levels {
         return;
     }
     let around = |(low, high): Span, (middle, _): &Item| (low.inf(middle), high.sup(middle));
-    let (low, high) = items.iter().fold(NOWHERE, around);
+    let (low, high) = items.iter().fold(EMPTY, around);
     let axis = (high - low).imax();
     let half = starts(count, level + 1, 2 * node + 1) - starts(count, level, node);
     items.select_nth_unstable_by(half, |a, b| a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1)));
@@ -281,7 +282,7 @@ fn sort(items: &mut [Item], count: usize, levels: u32, level: u32, node: usize) 
 }
 
 /// Squared distance of a point from a box (m2): 0 inside.
-fn square_to((low, high): &Span, point: DVec3) -> f64 {
+fn squared_distance_to((low, high): &Span, point: DVec3) -> f64 {
     let beyond = |axis: usize| {
         let [low, high] = [low, high].map(|corner| f64::from(corner[axis]));
         (low - point[axis]).max(point[axis] - high).max(0.0)
@@ -310,18 +311,18 @@ impl Facet {
     /// The position nearest to a point: on the face if the point lies on the inner side of all edges, else on one of these (Ericson,
     /// Real-Time Collision Detection, 2005, 5.1.5). Planes along the edges separate the regions, not, as there, products of projections,
     /// whose rounding grows with the square of a needle's length.
-    pub(in crate::geometry) fn found(&self, point: DVec3, facet: usize) -> Found {
+    pub(in crate::geometry) fn nearest(&self, point: DVec3, facet: usize) -> FacetPoint {
         let [a, b, c] = self.corners.map(|corner| corner.cast::<f64>());
         let edges = [(a, b), (b, c), (c, a)];
         let normal = (b - a).cross(&(c - a));
         let is_inward = |&(from, to): &(DVec3, DVec3)| (to - from).cross(&(point - from)).dot(&normal) > 0.0;
         if !self.is_needle && edges.iter().all(is_inward) {
             let above = normal * ((point - a).dot(&normal) / normal.norm_squared());
-            return Found { position: point - above, square: above.norm_squared(), facet };
+            return FacetPoint { position: point - above, square: above.norm_squared(), facet };
         }
         let on_edge = |(from, to): (DVec3, DVec3)| {
             let position = nearest_of_edge(point, from, to);
-            Found { position, square: (position - point).norm_squared(), facet }
+            FacetPoint { position, square: (position - point).norm_squared(), facet }
         };
         let [one, two, three] = edges.map(on_edge);
         let nearer = if two.square < one.square { two } else { one };
@@ -333,14 +334,14 @@ impl Facet {
 fn nearest_of_edge(point: DVec3, from: DVec3, to: DVec3) -> DVec3 {
     let along = to - from;
     let square = along.norm_squared();
-    let way = (point - from).dot(&along);
+    let projection = (point - from).dot(&along);
     // Exact at the ends.
-    if way <= 0.0 || square == 0.0 {
+    if projection <= 0.0 || square == 0.0 {
         from
-    } else if way >= square {
+    } else if projection >= square {
         to
     } else {
-        from + along * (way / square)
+        from + along * (projection / square)
     }
 }
 
@@ -375,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tree_finds_what_a_look_at_every_triangle_finds() {
+    fn the_tree_agrees_with_brute_force() {
         for (seed, count) in [(1, 1), (2, 5), (3, 64), (4, 1001)] {
             let mesh = litter(seed, count);
             let tree = NearestTree::new(&mesh);
@@ -386,7 +387,7 @@ mod tests {
             let mut guess = None;
             for n in 0..300 {
                 let point: DVec3 = random.vector([1.2, 0.2, 20.0][n % 3]).cast();
-                let best = |found: f64, facet: &Facet| found.min(facet.found(point, 0).square);
+                let best = |found: f64, facet: &Facet| found.min(facet.nearest(point, 0).square);
                 let least = tree.facets.iter().fold(f64::INFINITY, best).sqrt();
                 let nearest = tree.nearest(point).unwrap();
                 let hinted = tree.search(point, guess).unwrap();
@@ -409,11 +410,11 @@ mod tests {
             let size = (b - a).norm().max((c - a).norm()).max((c - b).norm());
             for scale in [0.3, 1.0, 3.0] {
                 let point = (a + b + c) / 3.0 + random.vector(scale).cast::<f64>() * size;
-                let found = facet.found(point, 0);
+                let found = facet.nearest(point, 0);
                 let close = 1e-6 * size * size;
                 // The nearest position of a convex set: all of the set lies behind the plane through it that faces the point.
-                let way = point - found.position;
-                assert!([a, b, c].iter().all(|corner| way.dot(&(corner - found.position)) <= close));
+                let outward = point - found.position;
+                assert!([a, b, c].iter().all(|corner| outward.dot(&(corner - found.position)) <= close));
                 // It lies in the triangle: its triangles with the edges are together no larger than the whole.
                 let area = |p: DVec3, q: DVec3, r: DVec3| (q - p).cross(&(r - p)).norm();
                 let position = found.position;
@@ -439,7 +440,7 @@ mod tests {
     }
 
     #[test]
-    fn points_count_by_the_area_that_they_stand_for() {
+    fn points_are_weighted_by_the_area_that_they_represent() {
         // Squares in planes across y.
         let square = |x: f32, y: f32, size: f32| {
             let corners = [[x, y, 0.0], [x, y, size], [x + size, y, size], [x + size, y, 0.0]];
@@ -467,7 +468,7 @@ mod tests {
     }
 
     #[test]
-    fn vertices_tremble_by_their_second_differences() {
+    fn second_differences_measure_jitter() {
         let at = |x: f32| {
             let mut cube = TriMesh::cuboid([x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]);
             cube.positions.push(Vec3::new(x * x, 0.0, 0.0));
@@ -482,7 +483,7 @@ mod tests {
     }
 
     #[test]
-    fn any_number_of_threads_finds_the_same() {
+    fn any_number_of_threads_gives_the_same_result() {
         let (mesh, other) = (litter(11, 20_000), litter(12, 3_000));
         let with = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -20,7 +20,7 @@ impl Doubles {
         let order = by_vertices(triangles);
         let mut is_alone = vec![true; count];
         for same in order.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() > 1) {
-            let is_two_sided = same.iter().any(|(_, _, way)| *way != same[0].2);
+            let is_two_sided = same.iter().any(|(_, _, is_ascending)| *is_ascending != same[0].2);
             for (at, (_, number, _)) in same.iter().enumerate() {
                 let number = *number as usize;
                 (out.is_double[number], is_alone[number]) = (at > 0, false);
@@ -30,19 +30,22 @@ impl Doubles {
         if !out.is_double.contains(&true) {
             return out;
         }
-        let bodies = parts_of(count, uses);
+        let components = parts_of(count, uses);
         let (mut has_single, mut is_balanced, mut is_closed) =
             (vec![false; count], vec![true; count], vec![true; count]);
-        bodies.iter().zip(&is_alone).for_each(|(body, is_alone)| has_single[*body as usize] |= is_alone);
+        components
+            .iter()
+            .zip(&is_alone)
+            .for_each(|(component, is_alone)| has_single[*component as usize] |= is_alone);
         for run in uses.chunk_by(is_same_edge) {
-            let body = bodies[run[0].1 as usize] as usize;
-            is_balanced[body] &= imbalance(triangles, run) == 0;
+            let component = components[run[0].1 as usize] as usize;
+            is_balanced[component] &= imbalance(triangles, run) == 0;
             let kept = run.iter().filter(|used| !out.is_double[used.1 as usize]).count();
-            is_closed[body] &= kept % 2 == 0;
+            is_closed[component] &= kept % 2 == 0;
         }
-        for (is_double, body) in out.is_double.iter_mut().zip(&bodies) {
-            let body = *body as usize;
-            *is_double &= !(has_single[body] && is_balanced[body] && !is_closed[body]);
+        for (is_double, component) in out.is_double.iter_mut().zip(&components) {
+            let component = *component as usize;
+            *is_double &= !(has_single[component] && is_balanced[component] && !is_closed[component]);
         }
         out
     }
@@ -53,7 +56,8 @@ pub fn rotated<T: Ord + Copy>([a, b, c]: [T; 3]) -> [T; 3] {
     [a, b, c].min([b, c, a]).min([c, a, b])
 }
 
-/// Triangles sorted by their vertices, these ascending: each with its index and its orientation, true if they ascend in its own order too.
+/// Triangles sorted by their vertices, which ascend: each with its index, and whether its own order of the vertices ascends too, up to
+/// rotation.
 pub fn by_vertices(triangles: &[[u32; 3]]) -> Vec<([u32; 3], u32, bool)> {
     let sorted = |(triangle, number): (&[u32; 3], u32)| {
         let [a, b, c] = rotated(*triangle);
@@ -73,20 +77,20 @@ pub fn copies<K: Ord + Copy + Send>(
 ) -> Vec<bool> {
     let mut is_copy = vec![false; parts.len()];
     // Equal parts have the same number of triangles and the same minimum key: only such parts are compared.
-    let mut marks: Vec<(u32, Option<K>)> = vec![(0, None); parts.len()];
+    let mut signatures: Vec<(u32, Option<K>)> = vec![(0, None); parts.len()];
     for (at, &part) in parts.iter().enumerate() {
-        let (count, least) = &mut marks[part as usize];
+        let (count, least) = &mut signatures[part as usize];
         *count += 1;
         let own = key(at);
         *least = Some(least.map_or(own, |least| least.min(own)));
     }
-    let mut named: Vec<u32> = (0..parts.len() as u32)
+    let mut firsts: Vec<u32> = (0..parts.len() as u32)
         .filter(|at| parts[*at as usize] == *at && is_compared(*at as usize))
         .collect();
-    named.sort_unstable_by_key(|&part| (marks[part as usize], part));
+    firsts.sort_unstable_by_key(|&part| (signatures[part as usize], part));
     let mut is_like_another = vec![false; parts.len()];
-    let is_alike = |a: &u32, b: &u32| marks[*a as usize] == marks[*b as usize];
-    for alike in named.chunk_by(is_alike).filter(|alike| alike.len() > 1) {
+    let is_alike = |a: &u32, b: &u32| signatures[*a as usize] == signatures[*b as usize];
+    for alike in firsts.chunk_by(is_alike).filter(|alike| alike.len() > 1) {
         alike.iter().for_each(|&part| is_like_another[part as usize] = true);
     }
     let mut order: Vec<(u32, K, u32)> = (0u32..)
@@ -96,10 +100,10 @@ pub fn copies<K: Ord + Copy + Send>(
         .collect();
     order.par_sort_unstable();
     // The sort is stable: of equal parts the first stays first.
-    let mut bodies: Vec<&[(u32, K, u32)]> = order.chunk_by(|a, b| a.0 == b.0).collect();
-    let keys = |body: &&[(u32, K, u32)]| -> Vec<K> { body.iter().map(|one| one.1).collect() };
-    bodies.sort_by_cached_key(|body| (body.len(), keys(body)));
-    for same in bodies.chunk_by(|a, b| a.len() == b.len() && a.iter().zip(*b).all(|(a, b)| a.1 == b.1)) {
+    let mut groups: Vec<&[(u32, K, u32)]> = order.chunk_by(|a, b| a.0 == b.0).collect();
+    let keys = |group: &&[(u32, K, u32)]| -> Vec<K> { group.iter().map(|one| one.1).collect() };
+    groups.sort_by_cached_key(|group| (group.len(), keys(group)));
+    for same in groups.chunk_by(|a, b| a.len() == b.len() && a.iter().zip(*b).all(|(a, b)| a.1 == b.1)) {
         same[1..].iter().copied().flatten().for_each(|(_, _, at)| is_copy[*at as usize] = true);
     }
     is_copy

@@ -1,4 +1,4 @@
-//! Edges of triangles, the parts that they connect, and neighbours that agree on which side is out.
+//! Edges of triangles, the parts that they connect, and the consistent orientation of neighbours.
 
 use super::topology::Sets;
 use crate::geometry::lists::Lists;
@@ -6,10 +6,10 @@ use crate::geometry::lists::Lists;
 /// An edge, smaller vertex index first, and a triangle that has it.
 pub type Use = ([u32; 2], u32);
 
-/// Of an edge without a second triangle.
+/// The neighbour across an edge without a second triangle.
 const NONE: u32 = u32::MAX;
-/// Triangles of the smallest closed part, a tetrahedron.
-const SMALLEST: u32 = 4;
+/// Minimum triangles of a closed part: a tetrahedron.
+const MIN_TRIANGLES: u32 = 4;
 
 /// The edges of triangles over `vertices` vertices, sorted, each with all triangles that have it.
 pub fn edge_uses(vertices: usize, triangles: &[[u32; 3]]) -> Vec<Use> {
@@ -35,7 +35,7 @@ pub fn runs(triangle: &[u32; 3], [from, to]: [u32; 2]) -> bool {
     (0..3).any(|side| triangle[side] == from && triangle[(side + 1) % 3] == to)
 }
 
-/// Triangles of an edge that run along it from its first end to its second, minus those that run back.
+/// Number of triangles that run along an edge from its first end to its second, minus those that run back.
 pub fn imbalance(triangles: &[[u32; 3]], run: &[Use]) -> i32 {
     run.iter().map(|&(ends, triangle)| if runs(&triangles[triangle as usize], ends) { 1 } else { -1 }).sum()
 }
@@ -65,7 +65,7 @@ pub fn sound(triangles: &[[u32; 3]], uses: &[Use], parts: &[u32]) -> Vec<bool> {
     }
     let mut counts = vec![0u32; parts.len()];
     parts.iter().for_each(|&part| counts[part as usize] += 1);
-    parts.iter().map(|&part| is_sound[part as usize] && counts[part as usize] >= SMALLEST).collect()
+    parts.iter().map(|&part| is_sound[part as usize] && counts[part as usize] >= MIN_TRIANGLES).collect()
 }
 
 /// Which triangles must be flipped so that neighbours agree.

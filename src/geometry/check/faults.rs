@@ -9,7 +9,7 @@ use crate::geometry::mesh::weld::Weld;
 use crate::geometry::mesh::{coincident, used};
 use crate::geometry::shape::{bounds, six_volumes};
 use crate::geometry::spatial::bvh::Bvh;
-use crate::geometry::spatial::near_pairs::Near;
+use crate::geometry::spatial::near_pairs::NearPairs;
 use crate::geometry::{DVec3, TriMesh};
 
 /// Triangles per task.
@@ -39,7 +39,7 @@ pub struct Faults {
     /// Connected sets of open edges: holes.
     pub holes: usize,
     /// Edges with more than two triangles.
-    pub crowded_edges: usize,
+    pub non_manifold_edges: usize,
     /// Edges whose two triangles disagree on which side is out.
     pub turned_edges: usize,
     /// Vertices whose triangles do not form one ring, closed or open: where parts touch in a vertex, and both ends of each non-manifold
@@ -76,32 +76,34 @@ impl Faults {
     /// Surveys a mesh whose positions are finite and whose indices are in range.
     pub fn of(mesh: &TriMesh) -> Self {
         let vertices = mesh.positions.len();
-        let places: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
-        let weld = Weld::of(&places, &mesh.triangles);
+        let positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
+        let weld = Weld::of(&positions, &mesh.triangles);
         let same = &weld.firsts;
-        let one_corner = same.iter().enumerate().filter(|(vertex, same)| **same as usize != *vertex).count();
+        let joined_vertices =
+            same.iter().enumerate().filter(|(vertex, same)| **same as usize != *vertex).count();
         let flat = |corners: [u32; 3]| is_flat(&corners.map(|vertex| mesh.positions[vertex as usize]));
-        let Kept { kept, degenerate, doubled_triangles } = kept(&mesh.triangles, same, flat);
-        let survey = Survey::of(vertices, &kept);
-        let parts = parts(vertices, &kept);
-        let joined = TriMesh { positions: mesh.positions.clone(), triangles: kept };
+        let Counted { counted, degenerate, doubled_triangles } = counted(&mesh.triangles, same, flat);
+        let survey = Survey::of(vertices, &counted);
+        let parts = parts(vertices, &counted);
+        let joined = TriMesh { positions: mesh.positions.clone(), triangles: counted };
         let pairs = Pairs::of(&joined);
         let volume = joined.volume();
-        let is_closed = survey.open.is_empty() && survey.crowded.is_empty() && survey.turned.is_empty();
+        let is_closed =
+            survey.open.is_empty() && survey.non_manifold_edges.is_empty() && survey.turned.is_empty();
         Self {
             unused_vertices: used(vertices, &mesh.triangles).map_or(0, |used| vertices - used.len()),
-            doubled_vertices: one_corner - weld.near.len(),
+            doubled_vertices: joined_vertices - weld.near.len(),
             near_vertices: weld.near.len(),
             ambiguous_vertices: weld.ambiguous.len(),
             degenerate,
             doubled_triangles,
             holes: groups(vertices, survey.open.iter().copied()),
             open_edges: survey.open.len(),
-            crowded_edges: survey.crowded.len(),
+            non_manifold_edges: survey.non_manifold_edges.len(),
             turned_edges: survey.turned.len(),
-            non_manifold_vertices: survey.non_manifold.len(),
+            non_manifold_vertices: survey.non_manifold_vertices.len(),
             parts,
-            inverted_parts: if is_closed { inverted_parts(&joined, &survey.body, volume) } else { 0 },
+            inverted_parts: if is_closed { inverted_parts(&joined, &survey.component, volume) } else { 0 },
             area: joined.area(),
             volume,
             crossings: pairs.crossings,
@@ -115,9 +117,9 @@ impl Faults {
     }
 
     /// Whether the mesh clearly bounds a solid once vertices at the same position are joined: closed, each edge with two triangles that
-    /// agree, and no part inside out, unless all are. Whether it does so unjoined, [`Topology::is_watertight`] of `by_index` says.
+    /// agree, and no part inside out, unless all are. For the unjoined mesh, see [`Topology::is_watertight`] of `by_index`.
     pub fn is_solid(&self) -> bool {
-        let faults = [self.open_edges, self.crowded_edges, self.turned_edges, self.inverted_parts];
+        let faults = [self.open_edges, self.non_manifold_edges, self.turned_edges, self.inverted_parts];
         self.parts > 0 && faults == [0; 4]
     }
 
@@ -137,7 +139,7 @@ pub fn meeting_pairs(mesh: &TriMesh) -> Vec<[u32; 2]> {
     let (triangles, numbers): (Vec<[u32; 3]>, Vec<u32>) =
         joined.filter(|(corners, _)| !collapsed(*corners) && !is_flat(&position(*corners))).unzip();
     let joined = TriMesh { positions: mesh.positions.clone(), triangles };
-    let near = Near::of(&joined);
+    let near = NearPairs::of(&joined);
     let of_triangle = |first: usize| {
         let mut pairs = Vec::new();
         near.of_triangle(first, |second| {
@@ -162,31 +164,36 @@ pub fn holes(positions: &[DVec3], triangles: &[[u32; 3]], same: &[u32]) -> usize
         let [a, b, c] = corners.map(|vertex| positions[vertex as usize]);
         (b - a).cross(&(c - a)).norm_squared() == 0.0
     };
-    let survey = Survey::of(positions.len(), &kept(triangles, same, flat).kept);
+    let survey = Survey::of(positions.len(), &counted(triangles, same, flat).counted);
     groups(positions.len(), survey.open.into_iter())
 }
 
 /// Area (m2) of the triangles that count: all except those with the corners of an earlier one.
 pub fn counted_area(mesh: &TriMesh) -> f64 {
-    let places: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
-    let kept = kept(&mesh.triangles, &Weld::of(&places, &mesh.triangles).firsts, |_| false).kept;
-    TriMesh { positions: mesh.positions.clone(), triangles: kept }.area()
+    let positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
+    let triangles =
+        counted(&mesh.triangles, &Weld::of(&positions, &mesh.triangles).firsts, |_| false).counted;
+    TriMesh { positions: mesh.positions.clone(), triangles }.area()
 }
 
 /// The triangles that count, with joined corners, and the number of those that do not.
-struct Kept {
-    kept: Vec<[u32; 3]>,
+struct Counted {
+    counted: Vec<[u32; 3]>,
     degenerate: usize,
     doubled_triangles: usize,
 }
 
-fn kept(triangles: &[[u32; 3]], same: &[u32], flat: impl Fn([u32; 3]) -> bool) -> Kept {
+fn counted(triangles: &[[u32; 3]], same: &[u32], flat: impl Fn([u32; 3]) -> bool) -> Counted {
     let joined = triangles.iter().map(|corners| corners.map(|vertex| same[vertex as usize]));
     let whole: Vec<[u32; 3]> = joined.filter(|corners| !collapsed(*corners) && !flat(*corners)).collect();
     let firsts = firsts(&whole);
-    let kept: Vec<[u32; 3]> =
+    let counted: Vec<[u32; 3]> =
         whole.iter().zip(&firsts).filter(|(_, first)| **first).map(|(corners, _)| *corners).collect();
-    Kept { degenerate: triangles.len() - whole.len(), doubled_triangles: whole.len() - kept.len(), kept }
+    Counted {
+        degenerate: triangles.len() - whole.len(),
+        doubled_triangles: whole.len() - counted.len(),
+        counted,
+    }
 }
 
 /// A connected part of a mesh.
@@ -218,16 +225,17 @@ impl<'a> Part<'a> {
         (0..3).all(|axis| {
             let by_axis = |a: &DVec3, b: &DVec3| a[axis].total_cmp(&b[axis]);
             let ends = [corners().min_by(by_axis), corners().max_by(by_axis)];
-            ends.into_iter().flatten().all(|position| turn * others.surrounding(position, ASLANT) > 0)
+            ends.into_iter().flatten().all(|position| turn * others.winding_number(position, ASLANT) > 0)
         })
     }
 }
 
 /// See [`Faults::inverted_parts`]; for a closed mesh of this volume, with the component of each triangle.
-fn inverted_parts(mesh: &TriMesh, body: &[u32], volume: f64) -> usize {
-    let mut order: Vec<usize> = (0..body.len()).collect();
-    order.sort_by_key(|&triangle| body[triangle]);
-    let parts = order.chunk_by(|a, b| body[*a] == body[*b]).map(|triangles| Part::of(mesh, triangles));
+fn inverted_parts(mesh: &TriMesh, component: &[u32], volume: f64) -> usize {
+    let mut order: Vec<usize> = (0..component.len()).collect();
+    order.sort_by_key(|&triangle| component[triangle]);
+    let parts =
+        order.chunk_by(|a, b| component[*a] == component[*b]).map(|triangles| Part::of(mesh, triangles));
     let (out, inverted): (Vec<Part<'_>>, Vec<Part<'_>>) =
         parts.filter(|part| part.volume != 0.0).partition(|part| (part.volume < 0.0) == (volume < 0.0));
     if inverted.is_empty() {
@@ -252,7 +260,7 @@ struct Pairs {
 impl Pairs {
     /// Requires triangles with an area, and corners joined by position.
     fn of(mesh: &TriMesh) -> Self {
-        let near = Near::of(mesh);
+        let near = NearPairs::of(mesh);
         let corners =
             |triangle: usize| mesh.triangles[triangle].map(|vertex| mesh.positions[vertex as usize]);
         let of_triangle = |first: usize| {
@@ -321,6 +329,6 @@ mod tests {
         mesh.triangles.extend([[2, 1, 0], [0, 5, 1], [0, 1, 6]]);
         let faults = Faults::of(&mesh);
         assert_eq!((faults.unused_vertices, faults.doubled_vertices), (1, 1));
-        assert_eq!((faults.doubled_triangles, faults.degenerate, faults.crowded_edges), (1, 1, 1));
+        assert_eq!((faults.doubled_triangles, faults.degenerate, faults.non_manifold_edges), (1, 1, 1));
     }
 }

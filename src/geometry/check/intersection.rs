@@ -28,22 +28,22 @@ pub fn meeting(first: &[Vec3; 3], second: &[Vec3; 3]) -> Meeting {
     let common = first.map(|corner| second.iter().position(|other| *other == corner));
     match common {
         [None, None, None] => without_corner(first, second),
-        [Some(at), None, None] => at_corner(first, &from(second, at)),
-        [None, Some(at), None] => at_corner(&from(first, 1), &from(second, at)),
-        [None, None, Some(at)] => at_corner(&from(first, 2), &from(second, at)),
+        [Some(at), None, None] => at_corner(first, &rotated_to(second, at)),
+        [None, Some(at), None] => at_corner(&rotated_to(first, 1), &rotated_to(second, at)),
+        [None, None, Some(at)] => at_corner(&rotated_to(first, 2), &rotated_to(second, at)),
         [Some(_), Some(_), None] => along_edge(first, second),
-        [None, Some(_), Some(_)] => along_edge(&from(first, 1), second),
-        [Some(_), None, Some(_)] => along_edge(&from(first, 2), second),
+        [None, Some(_), Some(_)] => along_edge(&rotated_to(first, 1), second),
+        [Some(_), None, Some(_)] => along_edge(&rotated_to(first, 2), second),
         [Some(_), Some(_), Some(_)] => Meeting::Overlap,
     }
 }
 
 /// The triangle rotated to begin with another corner.
-fn from(triangle: &Triangle, corner: usize) -> Triangle {
+fn rotated_to(triangle: &Triangle, corner: usize) -> Triangle {
     [0, 1, 2].map(|next| triangle[(corner + next) % 3])
 }
 
-/// Triangles whose first two corners, as the first has them, are common: they overlap if folded along the edge.
+/// Triangles with a common edge, the first two corners of `first`: they overlap if folded along it.
 fn along_edge(first: &Triangle, second: &Triangle) -> Meeting {
     let [a, b, c] = *first;
     let Some(&apex) = second.iter().find(|corner| !first.contains(corner)) else { return Meeting::Overlap };
@@ -76,7 +76,7 @@ fn at_corner(first: &Triangle, second: &Triangle) -> Meeting {
 /// Triangles without a common corner.
 fn without_corner(first: &Triangle, second: &Triangle) -> Meeting {
     let view = View::of(first);
-    if beside(view, first, second, -1) || beside(View::of(second), second, first, -1) {
+    if is_separated(view, first, second, -1) || is_separated(View::of(second), second, first, -1) {
         return Meeting::Apart;
     }
     let on_first = sides(first, second);
@@ -91,7 +91,7 @@ fn without_corner(first: &Triangle, second: &Triangle) -> Meeting {
         return Meeting::Apart;
     }
     // Each covers an interval of the common line, between the two edges that leave its lone corner.
-    let ([p, p1, p2], [q, q1, q2]) = (from(first, lone(on_second)), from(second, lone(on_first)));
+    let ([p, p1, p2], [q, q1, q2]) = (rotated_to(first, lone(on_second)), rotated_to(second, lone(on_first)));
     let order = [[p1, q1], [p1, q2], [p2, q1], [p2, q2]].map(|[end, other]| orient3d(p, end, q, other));
     if one_sided(&order) {
         return Meeting::Apart;
@@ -113,7 +113,7 @@ fn straddles(signs: &[i32]) -> bool {
     signs.contains(&1) && signs.contains(&-1)
 }
 
-/// The corner that is alone on its side of the plane.
+/// The corner that lies alone on its side of the plane.
 fn lone(signs: [i32; 3]) -> usize {
     let apart = |&corner: &usize| {
         let [a, b] = [signs[(corner + 1) % 3], signs[(corner + 2) % 3]];
@@ -149,19 +149,19 @@ impl View {
     }
 }
 
-/// Whether, in a view that shows `triangle` counter-clockwise, the line of one of its edges separates it from another: strictly (`most` is
-/// -1), or with corners on the line (0).
-fn beside(view: View, triangle: &Triangle, other: &Triangle, most: i32) -> bool {
+/// Whether, in a view that shows `triangle` counter-clockwise, the line of one of its edges separates it from another: strictly (`max_turn`
+/// is -1), or with corners on the line (0).
+fn is_separated(view: View, triangle: &Triangle, other: &Triangle, max_turn: i32) -> bool {
     (0..3).any(|edge| {
         let (a, b) = (triangle[edge], triangle[(edge + 1) % 3]);
-        other.iter().all(|&corner| view.turn(a, b, corner) <= most)
+        other.iter().all(|&corner| view.turn(a, b, corner) <= max_turn)
     })
 }
 
 /// Whether coplanar triangles overlap in an area.
 fn areas_meet(view: View, first: &Triangle, second: &Triangle) -> bool {
     let second = counter_clockwise(view, second);
-    !beside(view, first, &second, 0) && !beside(view, &second, first, 0)
+    !is_separated(view, first, &second, 0) && !is_separated(view, &second, first, 0)
 }
 
 fn counter_clockwise(view: View, triangle: &Triangle) -> Triangle {
@@ -185,7 +185,7 @@ mod tests {
 
     type Whole = [i64; 3];
 
-    fn less(a: Whole, b: Whole) -> Whole {
+    fn minus(a: Whole, b: Whole) -> Whole {
         [0, 1, 2].map(|axis| a[axis] - b[axis])
     }
 
@@ -198,13 +198,13 @@ mod tests {
     }
 
     fn normal([a, b, c]: [Whole; 3]) -> Whole {
-        cross(less(b, a), less(c, a))
+        cross(minus(b, a), minus(c, a))
     }
 
     /// Whether a plane separates two triangles, which may be edges: `strictly`, or so that their interiors have no common point. If any
     /// plane does, one of finitely many directions does.
-    fn parted(first: [Whole; 3], second: [Whole; 3], strictly: bool) -> bool {
-        let edges = |t: [Whole; 3]| [less(t[1], t[0]), less(t[2], t[1]), less(t[0], t[2])];
+    fn is_parted(first: [Whole; 3], second: [Whole; 3], strictly: bool) -> bool {
+        let edges = |t: [Whole; 3]| [minus(t[1], t[0]), minus(t[2], t[1]), minus(t[0], t[2])];
         let (of_first, of_second) = (edges(first), edges(second));
         let normals = [normal(first), normal(second)];
         let mut directions = normals.to_vec();
@@ -225,8 +225,8 @@ mod tests {
 
     /// The definition, by separating planes.
     fn by_planes(first: [Whole; 3], second: [Whole; 3]) -> Meeting {
-        let is_flat = second.iter().all(|&corner| dot(normal(first), less(corner, first[0])) == 0);
-        if !parted(first, second, false) {
+        let is_flat = second.iter().all(|&corner| dot(normal(first), minus(corner, first[0])) == 0);
+        if !is_parted(first, second, false) {
             return if is_flat { Meeting::Overlap } else { Meeting::Cross };
         }
         let common: Vec<Whole> = first.into_iter().filter(|corner| second.contains(corner)).collect();
@@ -235,8 +235,8 @@ mod tests {
             [others[0], others[1], others[1]]
         };
         let apart = match common.len() {
-            0 => parted(first, second, true),
-            1 => parted(opposite(first), second, true) && parted(first, opposite(second), true),
+            0 => is_parted(first, second, true),
+            1 => is_parted(opposite(first), second, true) && is_parted(first, opposite(second), true),
             _ => true,
         };
         if apart { Meeting::Apart } else { Meeting::Touch }

@@ -14,7 +14,7 @@ pub struct Topology {
     /// Edges with one triangle.
     pub open_edges: usize,
     /// Edges with more than two triangles.
-    pub crowded_edges: usize,
+    pub non_manifold_edges: usize,
     /// Edges whose two triangles disagree on which side is out.
     pub turned_edges: usize,
     /// Vertices whose triangles do not form one ring, closed or open: where parts touch in a vertex, and both ends of each non-manifold
@@ -32,9 +32,9 @@ impl Topology {
             collapsed_triangles: triangles.len() - whole.len(),
             doubled_triangles: firsts(&whole).iter().filter(|first| !**first).count(),
             open_edges: survey.open.len(),
-            crowded_edges: survey.crowded.len(),
+            non_manifold_edges: survey.non_manifold_edges.len(),
             turned_edges: survey.turned.len(),
-            non_manifold_vertices: survey.non_manifold.len(),
+            non_manifold_vertices: survey.non_manifold_vertices.len(),
         }
     }
 
@@ -45,7 +45,7 @@ impl Topology {
             self.collapsed_triangles,
             self.doubled_triangles,
             self.open_edges,
-            self.crowded_edges,
+            self.non_manifold_edges,
             self.turned_edges,
             self.non_manifold_vertices,
         ];
@@ -57,13 +57,13 @@ impl Topology {
 /// different vertices.
 pub fn faulty(vertices: usize, triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<[u32; 2]>) {
     let survey = Survey::of(vertices, triangles);
-    (survey.non_manifold, [survey.open, survey.crowded, survey.turned].concat())
+    (survey.non_manifold_vertices, [survey.open, survey.non_manifold_edges, survey.turned].concat())
 }
 
 /// The components of a mesh: indices of triangles that edges connect, ascending; each triangle has three different vertices.
-pub fn bodies(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
+pub fn components(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
     let mut sets = Sets::new(triangles.len());
-    for pair in halves(triangles).windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+    for pair in half_edges(triangles).windows(2).filter(|pair| pair[0].0 == pair[1].0) {
         sets.join(pair[0].1 / 3, pair[1].1 / 3);
     }
     let mut order: Vec<(u32, u32)> =
@@ -71,7 +71,7 @@ pub fn bodies(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
     order.sort_unstable();
     order
         .chunk_by(|a, b| a.0 == b.0)
-        .map(|body| body.iter().map(|(_, triangle)| *triangle).collect())
+        .map(|component| component.iter().map(|(_, triangle)| *triangle).collect())
         .collect()
 }
 
@@ -80,27 +80,28 @@ pub(in crate::geometry) struct Survey {
     /// Edges with one triangle, smaller vertex index first.
     pub(in crate::geometry) open: Vec<[u32; 2]>,
     /// Edges with more than two triangles, smaller vertex index first.
-    pub(in crate::geometry) crowded: Vec<[u32; 2]>,
+    pub(in crate::geometry) non_manifold_edges: Vec<[u32; 2]>,
     /// Edges whose two triangles disagree, smaller vertex index first.
     pub(in crate::geometry) turned: Vec<[u32; 2]>,
     /// See [`Topology::non_manifold_vertices`].
-    pub(in crate::geometry) non_manifold: Vec<u32>,
+    pub(in crate::geometry) non_manifold_vertices: Vec<u32>,
     edges: usize,
     /// Number of rings of all vertices.
-    fans: usize,
+    rings: usize,
     /// For each triangle the first one of its component: the triangles that edges connect.
-    pub(in crate::geometry) body: Vec<u32>,
-    bodies: usize,
+    pub(in crate::geometry) component: Vec<u32>,
+    components: usize,
     triangles: usize,
 }
 
 impl Survey {
     pub(in crate::geometry) fn of(vertices: usize, triangles: &[[u32; 3]]) -> Self {
         let corners = triangles.as_flattened();
-        let (mut fans, mut bodies) = (Sets::new(corners.len()), Sets::new(triangles.len()));
-        let mut on_crowded = vec![false; vertices];
-        let (mut open, mut crowded, mut turned, mut edges) = (Vec::new(), Vec::new(), Vec::new(), 0);
-        for uses in halves(triangles).chunk_by(|a, b| a.0 == b.0) {
+        let (mut rings, mut components) = (Sets::new(corners.len()), Sets::new(triangles.len()));
+        let mut is_on_non_manifold = vec![false; vertices];
+        let (mut open, mut non_manifold_edges, mut turned, mut edges) =
+            (Vec::new(), Vec::new(), Vec::new(), 0);
+        for uses in half_edges(triangles).chunk_by(|a, b| a.0 == b.0) {
             let ends = uses[0].0;
             edges += 1;
             match uses {
@@ -108,31 +109,32 @@ impl Survey {
                 [(_, a), (_, b)] if corners[*a as usize] != corners[*b as usize] => {}
                 [_, _] => turned.push(ends),
                 _ => {
-                    crowded.push(ends);
-                    ends.iter().for_each(|&end| on_crowded[end as usize] = true);
+                    non_manifold_edges.push(ends);
+                    ends.iter().for_each(|&end| is_on_non_manifold[end as usize] = true);
                 }
             }
             for pair in uses.windows(2) {
-                let ([a, b], [c, d]) = ([pair[0].1, after(pair[0].1)], [pair[1].1, after(pair[1].1)]);
+                let ([a, b], [c, d]) =
+                    ([pair[0].1, next_corner(pair[0].1)], [pair[1].1, next_corner(pair[1].1)]);
                 let (c, d) = if corners[a as usize] == corners[c as usize] { (c, d) } else { (d, c) };
-                fans.join(a, c);
-                fans.join(b, d);
-                bodies.join(a / 3, c / 3);
+                rings.join(a, c);
+                rings.join(b, d);
+                components.join(a / 3, c / 3);
             }
         }
-        let mut fans_of = vec![0u32; vertices];
-        fans.roots().for_each(|corner| fans_of[corners[corner] as usize] += 1);
+        let mut rings_of = vec![0u32; vertices];
+        rings.roots().for_each(|corner| rings_of[corners[corner] as usize] += 1);
         Self {
             open,
-            crowded,
+            non_manifold_edges,
             turned,
-            non_manifold: (0..vertices as u32)
-                .filter(|vertex| fans_of[*vertex as usize] > 1 || on_crowded[*vertex as usize])
+            non_manifold_vertices: (0..vertices as u32)
+                .filter(|vertex| rings_of[*vertex as usize] > 1 || is_on_non_manifold[*vertex as usize])
                 .collect(),
             edges,
-            fans: fans.roots().count(),
-            body: (0..triangles.len() as u32).map(|triangle| bodies.root(triangle)).collect(),
-            bodies: bodies.roots().count(),
+            rings: rings.roots().count(),
+            component: (0..triangles.len() as u32).map(|triangle| components.root(triangle)).collect(),
+            components: components.roots().count(),
             triangles: triangles.len(),
         }
     }
@@ -140,9 +142,9 @@ impl Survey {
     /// Handles, summed over all components, if the surface is closed and has no non-manifold edge. A vertex with several rings counts as
     /// that many, and components that touch only there are separate.
     pub(in crate::geometry) fn genus(&self) -> Option<i64> {
-        let closed = self.open.is_empty() && self.crowded.is_empty() && self.triangles > 0;
-        let euler = self.fans as i64 - self.edges as i64 + self.triangles as i64;
-        closed.then_some(self.bodies as i64 - euler / 2)
+        let closed = self.open.is_empty() && self.non_manifold_edges.is_empty() && self.triangles > 0;
+        let euler = self.rings as i64 - self.edges as i64 + self.triangles as i64;
+        closed.then_some(self.components as i64 - euler / 2)
     }
 }
 
@@ -166,8 +168,8 @@ pub(in crate::geometry) fn firsts(triangles: &[[u32; 3]]) -> Vec<bool> {
     firsts
 }
 
-/// Edges (smaller vertex index first), each with the corner where one of its triangles begins to run along it; sorted.
-fn halves(triangles: &[[u32; 3]]) -> Vec<([u32; 2], u32)> {
+/// The half-edges, sorted: the edge (smaller vertex index first), and the corner where the half-edge begins.
+fn half_edges(triangles: &[[u32; 3]]) -> Vec<([u32; 2], u32)> {
     let of_triangle = |([a, b, c], first): ([u32; 3], u32)| {
         let half = |i: u32, j: u32, corner: u32| ([i.min(j), i.max(j)], 3 * first + corner);
         [half(a, b, 0), half(b, c, 1), half(c, a, 2)]
@@ -178,7 +180,7 @@ fn halves(triangles: &[[u32; 3]]) -> Vec<([u32; 2], u32)> {
 }
 
 /// The next corner of the same triangle.
-fn after(corner: u32) -> u32 {
+fn next_corner(corner: u32) -> u32 {
     if corner % 3 == 2 { corner - 2 } else { corner + 1 }
 }
 
@@ -189,7 +191,7 @@ pub fn parts(vertices: usize, triangles: &[[u32; 3]]) -> usize {
 
 /// For each vertex the sum of its neighbours' values, and how many have one. Each triangle around a vertex contributes the next vertex in
 /// its order.
-pub fn around<T: Default + Copy + std::ops::AddAssign>(
+pub fn neighbour_sums<T: Default + Copy + std::ops::AddAssign>(
     vertices: usize,
     triangles: &[[u32; 3]],
     of: impl Fn(u32) -> Option<T>,
@@ -207,14 +209,14 @@ pub fn around<T: Default + Copy + std::ops::AddAssign>(
     sums
 }
 
-/// Number of connected groups of the vertices that links use.
+/// Number of connected groups of the vertices that links use; each link connects two.
 pub(in crate::geometry) fn groups(vertices: usize, links: impl Iterator<Item = [u32; 2]>) -> usize {
-    let (mut sets, mut named) = (Sets::new(vertices), vec![false; vertices]);
+    let (mut sets, mut is_used) = (Sets::new(vertices), vec![false; vertices]);
     for link in links {
-        link.iter().for_each(|&vertex| named[vertex as usize] = true);
+        link.iter().for_each(|&vertex| is_used[vertex as usize] = true);
         sets.join(link[0], link[1]);
     }
-    sets.roots().filter(|&vertex| named[vertex]).count()
+    sets.roots().filter(|&vertex| is_used[vertex]).count()
 }
 
 /// Disjoint sets: each index points to a smaller one of its set, the smallest to itself.
@@ -269,9 +271,9 @@ mod tests {
         faults_of(t)
     }
 
-    /// Collapsed, doubled, open, crowded, turned, non-manifold.
+    /// Collapsed, doubled, open, non-manifold edges, turned, non-manifold vertices.
     fn faults_of(t: Topology) -> [usize; 6] {
-        let edges = [t.open_edges, t.crowded_edges, t.turned_edges];
+        let edges = [t.open_edges, t.non_manifold_edges, t.turned_edges];
         [t.collapsed_triangles, t.doubled_triangles, edges[0], edges[1], edges[2], t.non_manifold_vertices]
     }
 
@@ -298,16 +300,16 @@ mod tests {
     }
 
     #[test]
-    fn groups_hang_together_by_links() {
+    fn groups_are_connected_by_links() {
         assert_eq!(groups(9, [[7, 3], [1, 2], [3, 1], [5, 6], [6, 5]].into_iter()), 2);
         assert_eq!(groups(9, std::iter::empty()), 0);
     }
 
     #[test]
-    fn genus_takes_bodies_that_touch_in_a_vertex_apart() {
+    fn components_that_touch_in_a_vertex_have_separate_genera() {
         let mirrored = TETRAHEDRON.map(|corners| corners.map(|v| if v == 0 { 0 } else { v + 3 }));
         let two: Vec<[u32; 3]> = TETRAHEDRON.into_iter().chain(mirrored).collect();
         let survey = Survey::of(7, &two);
-        assert_eq!((survey.genus(), survey.non_manifold), (Some(0), vec![0]));
+        assert_eq!((survey.genus(), survey.non_manifold_vertices), (Some(0), vec![0]));
     }
 }

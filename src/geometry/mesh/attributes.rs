@@ -1,4 +1,4 @@
-//! Arrays of numbers that a mesh carries besides its positions and texture coordinates: colours, masks, whatever its file has.
+//! Arrays of numbers that a mesh carries besides its positions and texture coordinates: colours, masks and others of its file.
 
 use super::used;
 use crate::geometry::{TriMesh, Uvs};
@@ -143,7 +143,7 @@ impl MeshArray {
         Self { name: self.name.clone(), on: self.on, number: self.number, values }
     }
 
-    /// The same for triangles: `corners` are their corners among those of the faces, `faces` the faces that they come from.
+    /// The array of a triangulation: `corners` has the indices of each triangle's corners among those of the faces, `faces` the face of each.
     pub(in crate::geometry) fn of_triangles(self, corners: &[[usize; 3]], faces: &[usize]) -> Self {
         let values = match self.on {
             On::Vertices => self.values,

@@ -146,10 +146,10 @@ impl TriMesh {
 
 /// The vertices out of `count` that triangles use, ascending; `None` if they use all.
 pub fn used(count: usize, triangles: &[[u32; 3]]) -> Option<Vec<u32>> {
-    let mut named = vec![false; count];
-    triangles.as_flattened().iter().for_each(|&vertex| named[vertex as usize] = true);
-    let used = || (0..count as u32).filter(|&vertex| named[vertex as usize]).collect();
-    named.contains(&false).then(used)
+    let mut is_used = vec![false; count];
+    triangles.as_flattened().iter().for_each(|&vertex| is_used[vertex as usize] = true);
+    let used = || (0..count as u32).filter(|&vertex| is_used[vertex as usize]).collect();
+    is_used.contains(&false).then(used)
 }
 
 /// Triangles re-indexed to the vertices `used`, which ascend and include all that they use.
@@ -161,9 +161,9 @@ pub fn renumbered(triangles: &[[u32; 3]], used: &[u32]) -> Vec<[u32; 3]> {
 
 /// The vertices out of `count` that triangles use, ascending, and the triangles re-indexed to these.
 pub fn compact(count: usize, triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<[u32; 3]>) {
-    let names = used(count, triangles).unwrap_or_else(|| (0..count as u32).collect());
-    let triangles = renumbered(triangles, &names);
-    (names, triangles)
+    let used = used(count, triangles).unwrap_or_else(|| (0..count as u32).collect());
+    let triangles = renumbered(triangles, &used);
+    (used, triangles)
 }
 
 /// Drops values whose mark is set; those beyond the marks stay.
@@ -172,7 +172,7 @@ pub fn drop_marked<T>(values: &mut Vec<T>, marks: &[bool]) {
     values.retain(|_| marks.next() != Some(&true));
 }
 
-/// Re-indexes corners for when the marked items are dropped; no corner names one of these.
+/// Re-indexes corners to the items that remain when the marked ones are dropped; no corner may refer to a dropped item.
 pub fn renumber_kept(corners: &mut [u32], is_dropped: &[bool]) {
     let mut kept = 0;
     let number = |is_dropped: &bool| {
@@ -189,9 +189,9 @@ pub fn spacing(coordinate: f64) -> f64 {
     f64::from(at.next_up()) - f64::from(at)
 }
 
-/// A sentence about vertices or particles so far from the origin (in a file's unit of `scale` m) that their 32-bit coordinates are coarse
+/// A warning about vertices or particles so far from the origin (in a file's unit of `scale` m) that their 32-bit coordinates are coarse
 /// relative to a cell (m), with advice.
-pub fn too_far(name: &str, farthest: f64, scale: f64, cell: f64, advice: &str) -> Option<String> {
+pub fn too_far_warning(name: &str, farthest: f64, scale: f64, cell: f64, advice: &str) -> Option<String> {
     // Rounding by half the gap may use up the default tolerance of a sweep: 0.02 cell.
     let gap = spacing(farthest) * scale;
     (gap > 0.04 * cell).then(|| {
@@ -203,14 +203,14 @@ pub fn too_far(name: &str, farthest: f64, scale: f64, cell: f64, advice: &str) -
     })
 }
 
-/// As [`too_far`], for a mesh as it is read (m), relative to the mean length of its edges.
-pub fn is_coarse(name: &str, mesh: &TriMesh, advice: &str) -> Option<String> {
+/// As [`too_far_warning`], for a mesh as it is read (m), relative to the mean length of its edges.
+pub fn coarse_warning(name: &str, mesh: &TriMesh, advice: &str) -> Option<String> {
     let lengths = (0..mesh.triangles.len()).map(|triangle| {
         let [a, b, c] = mesh.corners(triangle);
         (b - a).norm() + (c - b).norm() + (a - c).norm()
     });
     let edge = lengths.sum::<f64>() / (3 * mesh.triangles.len()).max(1) as f64;
-    too_far(name, mesh.farthest(), 1.0, edge, advice)
+    too_far_warning(name, mesh.farthest(), 1.0, edge, advice)
 }
 
 /// Advice for a mesh too far from the origin: a key of a scene, or an option of a command.
@@ -266,8 +266,8 @@ pub(super) fn validate<'a>(positions: &[Vec3], faces: impl Iterator<Item = &'a [
         return Err(Error::argument(format!("vertex {} is not finite", vertex + 1)));
     }
     let count = positions.len();
-    let wild = |face: &[u32]| face.iter().any(|&index| index as usize >= count);
-    if let Some(face) = faces.position(wild) {
+    let is_out_of_range = |face: &[u32]| face.iter().any(|&index| index as usize >= count);
+    if let Some(face) = faces.position(is_out_of_range) {
         let what = format!("face {} names a vertex beyond the {count} there are", face + 1);
         return Err(Error::argument(what));
     }
@@ -296,12 +296,12 @@ mod tests {
     }
 
     #[test]
-    fn coordinates_far_from_the_origin_are_told() {
+    fn coordinates_far_from_the_origin_are_reported() {
         assert_eq!(spacing(60_000.0), 1.0 / 256.0);
-        assert_eq!(too_far("a.obj", 1_200.0, 1.0, 0.0075, BY_KEY), None);
-        let said = too_far("a.obj", 60_000.0, 1.0, 0.0075, BY_KEY).unwrap();
+        assert_eq!(too_far_warning("a.obj", 1_200.0, 1.0, 0.0075, BY_KEY), None);
+        let said = too_far_warning("a.obj", 60_000.0, 1.0, 0.0075, BY_KEY).unwrap();
         assert!(said.contains("a.obj") && said.contains("60000 m") && said.contains("3.9 mm"), "{said}");
-        assert!(too_far("a.obj", 6_000_000.0, 0.01, 0.0075, BY_KEY).is_some());
+        assert!(too_far_warning("a.obj", 6_000_000.0, 0.01, 0.0075, BY_KEY).is_some());
     }
 
     #[test]

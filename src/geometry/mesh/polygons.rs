@@ -6,10 +6,10 @@ use crate::geometry::triangulate::ear_clipping::turn;
 use crate::geometry::triangulate::{ear_clipping, monotone};
 use crate::geometry::{DVec3, DetailedMesh, MeshArray, TriMesh, Uvs, Vec3};
 
-/// Maximum corners of a polygon: cutting it takes some 300 bytes for each, which no memory limit sees.
-const MOST_CORNERS: usize = 1 << 22;
-/// Maximum corners of a polygon that is cut ear by ear: larger ones could take minutes.
-const FEW_CORNERS: usize = 500;
+/// Maximum corners of a polygon: triangulation takes some 300 bytes for each, which the memory limit does not count.
+const MAX_CORNERS: usize = 1 << 22;
+/// Maximum corners of a polygon that is triangulated by ear clipping: larger ones could take minutes.
+const MAX_EAR_CLIPPED: usize = 500;
 
 /// Polygons as in files: with any number of corners, convex or not, rarely exactly planar.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -43,9 +43,9 @@ impl PolygonMesh {
     /// Names the first invalid vertex or face, counted from 1; a face of more than 4,194,304 corners is invalid.
     pub fn validate(&self) -> Result<()> {
         validate(&self.positions, self.polygons())?;
-        match self.polygons().position(|polygon| polygon.len() > MOST_CORNERS) {
+        match self.polygons().position(|polygon| polygon.len() > MAX_CORNERS) {
             Some(face) => {
-                Err(Error::argument(format!("face {} has more than {MOST_CORNERS} corners", face + 1)))
+                Err(Error::argument(format!("face {} has more than {MAX_CORNERS} corners", face + 1)))
             }
             None => Ok(()),
         }
@@ -103,7 +103,8 @@ impl PolygonMesh {
         self.corners.len().saturating_sub(2 * self.ends.len())
     }
 
-    /// Cuts all polygons: calls `each` with where one begins in `corners`, its vertices, and a triangle of its corners.
+    /// Triangulates all polygons: calls `each` for each triangle with its polygon's start in `corners` and vertices, and the triangle's corners
+    /// among these.
     fn cut_all(&self, mut each: impl FnMut(usize, &[u32], [usize; 3])) {
         let mut begin = 0;
         for polygon in self.polygons() {
@@ -126,7 +127,7 @@ impl PolygonMesh {
         if (0..count).all(|i| turn(flat[(i + count - 1) % count], flat[i], flat[(i + 1) % count]) >= 0.0) {
             return fan(&mut each);
         }
-        let cut = if count > FEW_CORNERS { monotone::triangles } else { ear_clipping::triangles };
+        let cut = if count > MAX_EAR_CLIPPED { monotone::triangles } else { ear_clipping::triangles };
         cut(&flat).into_iter().for_each(each);
     }
 }
@@ -141,8 +142,8 @@ fn flattened(positions: &[DVec3]) -> Vec<[f64; 2]> {
         return vec![[0.0; 2]; positions.len()];
     }
     let normal = normal / length;
-    let least = normal.iamin();
-    let across = normal.cross(&DVec3::ith(least, 1.0)).normalize();
+    let smallest = normal.iamin();
+    let across = normal.cross(&DVec3::ith(smallest, 1.0)).normalize();
     let up = normal.cross(&across);
     positions.iter().map(|p| [(p - positions[0]).dot(&across), (p - positions[0]).dot(&up)]).collect()
 }
@@ -159,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn a_concave_polygon_keeps_its_area_and_no_triangle_is_turned_round() {
+    fn a_concave_polygon_keeps_its_area_and_no_triangle_is_flipped() {
         let comb = [
             [0.0, 0.0],
             [5.0, 0.0],
@@ -227,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn a_face_of_a_hundred_thousand_corners_takes_no_time() {
+    fn a_face_of_a_hundred_thousand_corners_takes_under_two_seconds() {
         let combs = [1, 2].into_iter().flat_map(|sides| {
             let comb = move |angle: f64| (format!("comb {sides} {angle}"), comb(100_000, sides, angle));
             [0.0, 0.4, 1.0, std::f64::consts::FRAC_PI_2, 2.5].map(comb)
@@ -254,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn a_face_that_crosses_itself_everywhere_takes_no_time() {
+    fn a_face_that_crosses_itself_everywhere_takes_under_ten_seconds() {
         let mut at = 1u32;
         let mut random = || {
             at = at.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -282,7 +283,7 @@ mod tests {
             }
         }
         let own = |i: usize| sides.get(&(i.min((i + 1) % count), i.max((i + 1) % count)));
-        let inner = sides.values().filter(|way| **way == 0).count();
+        let inner = sides.values().filter(|sum| **sum == 0).count();
         (0..count).all(|i| own(i) == Some(&if i + 1 < count { 1 } else { -1 }))
             && sides.len() == count + inner
     }
@@ -330,7 +331,7 @@ mod tests {
         assert_eq!(flat(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]).triangles().len(), 2);
         assert_eq!(flat(&[[0.0, 0.0]; 5]).triangles().len(), 3);
         let mut vast = square.clone();
-        vast.push((0..=MOST_CORNERS as u32).map(|i| i % 4));
+        vast.push((0..=MAX_CORNERS as u32).map(|i| i % 4));
         assert_eq!(vast.validate().unwrap_err().to_string(), "face 2 has more than 4194304 corners");
         let mut beyond = square;
         beyond.push([0, 1, 2, 9]);

@@ -16,7 +16,7 @@ pub struct Uvs {
 
 impl Uvs {
     /// Coordinates 0, 0 for meshes without any, with these numbers of vertices and triangles; by corner, or by vertex.
-    pub fn nothing(has_corners: bool, vertices: usize, faces: usize) -> Self {
+    pub fn zeros(has_corners: bool, vertices: usize, faces: usize) -> Self {
         match has_corners {
             true => {
                 Self { coordinates: vec![[0.0; 2]], corners: Some(vec![0; 3 * faces]), missing: 3 * faces }
@@ -43,9 +43,9 @@ impl Uvs {
         }
         let mut own: Vec<Option<[f32; 2]>> = vec![None; count];
         let agrees = |(&vertex, &index): (&u32, &u32)| {
-            let position = coordinates[index as usize];
+            let coordinate = coordinates[index as usize];
             // Vertices out of range are refused by the check of the mesh.
-            own.get_mut(vertex as usize).is_none_or(|own| *own.get_or_insert(position) == position)
+            own.get_mut(vertex as usize).is_none_or(|own| *own.get_or_insert(coordinate) == coordinate)
         };
         if vertices.iter().zip(&at).all(agrees) {
             let coordinates = own.into_iter().map(Option::unwrap_or_default).collect();
@@ -54,7 +54,7 @@ impl Uvs {
         Some(Self { coordinates, corners: Some(at), missing })
     }
 
-    /// The same for triangles, whose corners index those of the faces.
+    /// The coordinates of a triangulation, whose triangles have indices of the faces' corners.
     pub fn of_triangles(self, triangles: &[[usize; 3]]) -> Self {
         let corners =
             self.corners.map(|corners| triangles.as_flattened().iter().map(|&c| corners[c]).collect());
@@ -93,45 +93,45 @@ impl Uvs {
     }
 }
 
-/// Whether a pair of coordinates can be used.
-pub fn is_finite(position: [f32; 2]) -> bool {
-    position.iter().all(|value| value.is_finite())
+/// Whether both numbers of a coordinate are finite.
+pub fn is_finite(coordinate: [f32; 2]) -> bool {
+    coordinate.iter().all(|value| value.is_finite())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const POSITIONS: [[f32; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 0.0]];
+    const COORDINATES: [[f32; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 0.0]];
 
     #[test]
     fn corners_that_agree_are_vertices_and_a_seam_keeps_them_apart() {
         let vertices = [0, 2, 1, 1, 2, 3];
         // The same coordinates may occur twice.
-        let uvs = Uvs::of_corners(POSITIONS.to_vec(), vec![0, 1, 2, 2, 3, 0], &vertices, 5).unwrap();
+        let uvs = Uvs::of_corners(COORDINATES.to_vec(), vec![0, 1, 2, 2, 3, 0], &vertices, 5).unwrap();
         assert_eq!(uvs.coordinates, [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 0.0], [0.0, 0.0]]);
         assert_eq!((uvs.corners, uvs.missing), (None, 0));
-        let uvs = Uvs::of_corners(POSITIONS.to_vec(), vec![0, 1, 2, 2, 0, 0], &vertices, 5).unwrap();
-        assert_eq!((uvs.coordinates, uvs.corners), (POSITIONS.to_vec(), Some(vec![0, 1, 2, 2, 0, 0])));
+        let uvs = Uvs::of_corners(COORDINATES.to_vec(), vec![0, 1, 2, 2, 0, 0], &vertices, 5).unwrap();
+        assert_eq!((uvs.coordinates, uvs.corners), (COORDINATES.to_vec(), Some(vec![0, 1, 2, 2, 0, 0])));
     }
 
     #[test]
     fn corners_without_any_have_0() {
-        let uvs = Uvs::of_corners(POSITIONS.to_vec(), vec![1, NONE, NONE], &[0, 1, 1], 2).unwrap();
+        let uvs = Uvs::of_corners(COORDINATES.to_vec(), vec![1, NONE, NONE], &[0, 1, 1], 2).unwrap();
         assert_eq!((uvs.coordinates, uvs.corners, uvs.missing), (vec![[1.0, 0.0], [0.0, 0.0]], None, 2));
-        assert_eq!(Uvs::of_corners(POSITIONS.to_vec(), vec![NONE; 3], &[0, 1, 2], 3), None);
+        assert_eq!(Uvs::of_corners(COORDINATES.to_vec(), vec![NONE; 3], &[0, 1, 2], 3), None);
     }
 
     #[test]
     fn meshes_are_joined_with_and_without() {
         let (seam, smooth) = ([[0, 1, 2], [2, 1, 3]], [[2, 0, 1]]);
         let corners = Some(vec![0, 1, 2, 2, 1, 0]);
-        let first = Uvs { coordinates: POSITIONS[..3].to_vec(), corners, missing: 0 };
-        let second = Uvs { coordinates: POSITIONS[1..].to_vec(), corners: None, missing: 1 };
+        let first = Uvs { coordinates: COORDINATES[..3].to_vec(), corners, missing: 0 };
+        let second = Uvs { coordinates: COORDINATES[1..].to_vec(), corners: None, missing: 1 };
         let parts = [(Some(&first), 4, &seam[..]), (None, 3, &smooth), (Some(&second), 3, &smooth)];
         let all = Uvs::joined(parts.into_iter()).unwrap();
         assert_eq!(all.corners.as_deref(), Some(&[0, 1, 2, 2, 1, 0, 5, 3, 4, 8, 6, 7][..]));
-        assert_eq!((all.coordinates[4], all.coordinates[6], all.missing), ([0.0; 2], POSITIONS[1], 1));
+        assert_eq!((all.coordinates[4], all.coordinates[6], all.missing), ([0.0; 2], COORDINATES[1], 1));
         let all = Uvs::joined(parts[1..].iter().copied()).unwrap();
         assert_eq!((all.corners, all.coordinates.len()), (None, 6));
         assert_eq!(Uvs::joined(parts[1..2].iter().copied()), None);

@@ -9,7 +9,7 @@
 //! Three rounds, each for the edges that the previous one left open:
 //!
 //! 1. Within [`STEPS`] adjacent 32-bit numbers on each axis, at the precision of each coordinate.
-//! 2. The same, but steps are no finer than at half the mesh's extent: programs that turn a mesh leave 1e-9 in one triangle and 0 in
+//! 2. The same, but steps are no finer than at half the mesh's extent: programs that rotate a mesh leave 1e-9 in one triangle and 0 in
 //!    another, which by their own size are millions of steps apart. Only where it closes a part wholly: it may not bridge a slit of a
 //!    mesh that is open anyway.
 //! 3. Chains of corners, each within rounding of the next and the ends further apart. Only where it closes a part, and reported.
@@ -24,7 +24,7 @@ use crate::geometry::lists::Lists;
 /// Corners may be this many adjacent 32-bit numbers apart on each axis.
 pub const STEPS: i64 = 4;
 /// Maximum corners that one is compared with: more within rounding cannot be told apart.
-const MOST_NEAR: usize = 64;
+const MAX_NEAR: usize = 64;
 /// Edge (steps) of the cells used to look up corners: few corners need a second cell.
 const CELL: i64 = 4 * STEPS;
 
@@ -49,7 +49,7 @@ impl Weld {
         Self::with_boundary(positions, triangles, firsts, &boundary)
     }
 
-    /// As [`Weld::of`], if the vertices at equal positions and the boundary that they leave are known.
+    /// As [`Weld::of`], with `firsts` of [`coincident`] and the boundary after joining equal positions already known.
     pub fn with_boundary(
         positions: &[DVec3],
         triangles: &[[u32; 3]],
@@ -59,13 +59,13 @@ impl Weld {
         if boundary.is_empty() {
             return Self { firsts, near: Vec::new(), ambiguous: Vec::new() };
         }
-        let places: Vec<[f32; 3]> =
+        let boundary_positions: Vec<[f32; 3]> =
             boundary.vertices.iter().map(|&vertex| positions[vertex as usize].cast::<f32>().into()).collect();
         let both = boundary.edges.iter().flat_map(|&([a, b], _)| [(a, b), (b, a)]);
         let links = Lists::new(boundary.vertices.len(), both);
         let mut rounds = Rounds::new(boundary, &links);
-        let undecided = rounds.join(&Ruler::OWN.measure(&places), false);
-        let coarse = Ruler::of_extent(&places).map(|ruler| ruler.measure(&places));
+        let undecided = rounds.join(&Ruler::OWN.measure(&boundary_positions), false);
+        let coarse = Ruler::of_extent(&boundary_positions).map(|ruler| ruler.measure(&boundary_positions));
         for chains in [false, true] {
             let Some(coarse) = coarse.as_ref().filter(|_| rounds.has_open_edges()) else { break };
             let mut tried = rounds.clone();
@@ -97,7 +97,7 @@ impl Weld {
     }
 }
 
-/// What is open after joining equal positions: vertices on edges with one triangle, and all edges between these.
+/// The boundary after joining equal positions: vertices on edges with one triangle, and all edges between these.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Boundary {
     /// Ascending; each the first one at its position.
@@ -389,7 +389,7 @@ fn near_pairs(steps: &[[i64; 3]], some: &[u32]) -> (Vec<NearPair>, Vec<u32>) {
             for y in low[1]..=high[1] {
                 for z in low[2]..=high[2] {
                     let mut other = slots[find(&slots, [x, y, z])];
-                    while other != u32::MAX && count < MOST_NEAR {
+                    while other != u32::MAX && count < MAX_NEAR {
                         let off = [0, 1, 2].map(|axis| (steps[other as usize][axis] - at[axis]).abs());
                         let farthest = off.into_iter().max().unwrap_or(0);
                         if farthest <= STEPS {
@@ -401,7 +401,7 @@ fn near_pairs(steps: &[[i64; 3]], some: &[u32]) -> (Vec<NearPair>, Vec<u32>) {
                 }
             }
         }
-        if count == MOST_NEAR {
+        if count == MAX_NEAR {
             crowded.push(vertex);
         }
         let slot = find(&slots, cell(at));

@@ -76,7 +76,7 @@ impl Bvh {
     /// The first triangle that a ray hits before `limit`.
     pub fn ray(&self, origin: DVec3, direction: DVec3, limit: f64) -> Option<RayHit> {
         let mut best = None;
-        self.walk(origin, direction, limit, |hit| {
+        self.traverse(origin, direction, limit, |hit| {
             best = Some(hit);
             Some(hit.distance)
         });
@@ -108,32 +108,32 @@ impl Bvh {
     /// Whether a ray hits any triangle before `limit`.
     pub fn any_hit(&self, origin: DVec3, direction: DVec3, limit: f64) -> bool {
         let mut found = false;
-        self.walk(origin, direction, limit, |_| {
+        self.traverse(origin, direction, limit, |_| {
             found = true;
             None
         });
         found
     }
 
-    /// Number of triangles that a ray leaves through, minus those that it enters through: how many times a closed mesh surrounds its
-    /// origin. A ray that hits a common edge of triangles counts both.
-    pub fn surrounding(&self, origin: DVec3, direction: DVec3) -> i32 {
+    /// Winding number of a closed mesh around the origin of a ray: the triangles that the ray leaves through, minus those that it enters
+    /// through. A ray that hits a common edge of triangles counts both.
+    pub fn winding_number(&self, origin: DVec3, direction: DVec3) -> i32 {
         let mut sum = 0;
-        self.crossings(origin, direction, |_, way| sum += way);
+        self.crossings(origin, direction, |_, sign| sum += sign);
         sum
     }
 
     /// Calls `see` with all triangles that a ray passes through: with 1 if it leaves through the front, -1 if it enters.
     pub fn crossings(&self, origin: DVec3, direction: DVec3, mut see: impl FnMut(usize, i32)) {
-        self.walk(origin, direction, f64::INFINITY, |hit| {
+        self.traverse(origin, direction, f64::INFINITY, |hit| {
             let [a, b, c] = self.corners[hit.triangle].map(|corner| corner.cast::<f64>());
             see(hit.triangle, if (b - a).cross(&(c - a)).dot(&direction) > 0.0 { 1 } else { -1 });
             Some(f64::INFINITY)
         });
     }
 
-    /// Calls `see` with hits; it returns the new limit, or none to stop.
-    fn walk(
+    /// Calls `see` with hits, in no order; it returns the new limit, or none to stop.
+    fn traverse(
         &self,
         origin: DVec3,
         direction: DVec3,
@@ -157,7 +157,7 @@ impl Bvh {
                 continue;
             }
             for &triangle in &self.order[node.first as usize..(node.first + node.count) as usize] {
-                if let Some(hit) = meet(&self.corners[triangle as usize], origin, direction, limit) {
+                if let Some(hit) = intersect(&self.corners[triangle as usize], origin, direction, limit) {
                     match see(RayHit { triangle: triangle as usize, ..hit }) {
                         Some(nearer) => limit = nearer,
                         None => return,
@@ -180,8 +180,8 @@ fn enters(node: &Node, origin: DVec3, inverse: DVec3, limit: f64) -> bool {
     near <= far * (1.0 + 1e-12)
 }
 
-/// Moller and Trumbore 1997.
-fn meet(corners: &[Vec3; 3], origin: DVec3, direction: DVec3, limit: f64) -> Option<RayHit> {
+/// The hit of a ray with a triangle (Moller and Trumbore 1997).
+fn intersect(corners: &[Vec3; 3], origin: DVec3, direction: DVec3, limit: f64) -> Option<RayHit> {
     let [a, b, c] = corners.map(|corner| corner.cast::<f64>());
     let (e1, e2) = (b - a, c - a);
     let p = direction.cross(&e2);

@@ -9,7 +9,7 @@ use super::bvh::Bvh;
 use crate::geometry::{DVec3, TriMesh, Vec3};
 
 /// Maximum triangles around a vertex that is not a hub.
-const MOST: u32 = 16;
+const MAX_TRIANGLES: u32 = 16;
 /// Margin of arc boxes, in radii of the sphere that they lie on: far more than rounding to 32 bits costs.
 const MARGIN: f64 = 1e-6;
 
@@ -17,7 +17,7 @@ const MARGIN: f64 = 1e-6;
 type Span = (Vec3, Vec3);
 
 /// The triangles of a mesh, in trees of boxes.
-pub(in crate::geometry) struct Near<'a> {
+pub(in crate::geometry) struct NearPairs<'a> {
     mesh: &'a TriMesh,
     /// Triangles without a hub.
     others: Boxes,
@@ -36,7 +36,7 @@ struct Fan {
     arcs: Boxes,
 }
 
-impl<'a> Near<'a> {
+impl<'a> NearPairs<'a> {
     /// Requires triangles with an area, and corners joined by position.
     pub(in crate::geometry) fn of(mesh: &'a TriMesh) -> Self {
         let mut near = Self {
@@ -95,7 +95,7 @@ fn hubs(mesh: &TriMesh) -> Vec<Option<u32>> {
     let hub = |corners: &[u32; 3]| {
         let fullest =
             corners.iter().copied().max_by_key(|&vertex| (around[vertex as usize], Reverse(vertex)));
-        fullest.filter(|&vertex| around[vertex as usize] > MOST)
+        fullest.filter(|&vertex| around[vertex as usize] > MAX_TRIANGLES)
     };
     mesh.triangles.iter().map(hub).collect()
 }
@@ -128,9 +128,9 @@ struct Boxes {
 impl Boxes {
     fn new(boxes: impl Iterator<Item = (Span, usize)>) -> Self {
         let (boxes, numbers): (Vec<Span>, Vec<usize>) = boxes.unzip();
-        let nowhere = (Vec3::repeat(f32::INFINITY), Vec3::repeat(f32::NEG_INFINITY));
+        let empty = (Vec3::repeat(f32::INFINITY), Vec3::repeat(f32::NEG_INFINITY));
         let around = |(low, high): Span, (a, b): &Span| (low.inf(a), high.sup(b));
-        let whole = boxes.iter().fold(nowhere, around);
+        let whole = boxes.iter().fold(empty, around);
         // Each box as a triangle with these bounds.
         let positions = boxes.iter().flat_map(|&(low, high)| [low, high]).collect();
         let triangles = (0..boxes.len() as u32).map(|n| [2 * n, 2 * n, 2 * n + 1]).collect();
@@ -176,7 +176,7 @@ mod tests {
     fn all_pairs_that_meet_are_seen_once() {
         for seed in 1..5 {
             let mesh = tangle(seed);
-            let near = Near::of(&mesh);
+            let near = NearPairs::of(&mesh);
             assert!(near.fans.len() >= 3 && near.fan_of.iter().any(|fan| fan.is_none()));
             let mut seen = Vec::new();
             for first in 0..mesh.triangles.len() {
@@ -207,7 +207,7 @@ mod tests {
         let from_the_rim: Vec<[u32; 3]> = (1..n - 1).map(|at| [0, at, at + 1]).collect();
         for triangles in [around, from_the_rim] {
             let mesh = TriMesh { positions: positions.clone(), triangles };
-            let near = Near::of(&mesh);
+            let near = NearPairs::of(&mesh);
             let mut pairs = 0;
             (0..mesh.triangles.len()).for_each(|triangle| near.of_triangle(triangle, |_| pairs += 1));
             assert!((n as usize - 3..3 * n as usize).contains(&pairs), "{pairs}");

@@ -13,7 +13,7 @@ pub type Point = [f64; 2];
 /// Maximum corners of a leaf box, compared one by one.
 const LEAF: usize = 8;
 /// Maximum boxes visited per corner, before the search for ears is given up: more than a polygon of the allowed size needs.
-const LOOKS: usize = 1200;
+const MAX_VISITS: usize = 1200;
 
 /// Twice the area of a triangle, positive when it is counter-clockwise.
 pub fn turn(a: Point, b: Point, c: Point) -> f64 {
@@ -45,16 +45,16 @@ struct Ring<'a> {
     points: &'a [Point],
     before: Vec<usize>,
     after: Vec<usize>,
-    is_left: Vec<bool>,
+    is_remaining: Vec<bool>,
     near: Boxes,
     /// Corners that were ears when they were added.
     ears: BinaryHeap<Reverse<usize>>,
     is_ear: Vec<bool>,
-    /// Corners with their turn when they were added.
+    /// Corners with their turn when they were added, the widest first.
     wide: BinaryHeap<Wide>,
     turns: Vec<f64>,
     /// Boxes that may still be visited.
-    looks: usize,
+    visits_left: usize,
 }
 
 /// A corner, ordered by its turn, then by its index.
@@ -82,15 +82,15 @@ impl<'a> Ring<'a> {
             points,
             before: (0..count).map(|i| (i + count - 1) % count).collect(),
             after: (0..count).map(|i| (i + 1) % count).collect(),
-            is_left: vec![true; count],
+            is_remaining: vec![true; count],
             near: Boxes::new(points),
             ears: BinaryHeap::new(),
             is_ear: vec![false; count],
             wide: BinaryHeap::new(),
             turns: vec![0.0; count],
-            looks: LOOKS * count,
+            visits_left: MAX_VISITS * count,
         };
-        (0..count).for_each(|corner| ring.look(corner));
+        (0..count).for_each(|corner| ring.classify(corner));
         ring
     }
 
@@ -100,13 +100,14 @@ impl<'a> Ring<'a> {
     }
 
     /// Classifies a corner.
-    fn look(&mut self, corner: usize) {
+    fn classify(&mut self, corner: usize) {
         let [a, b, c] = self.around(corner).map(|i| self.points[i]);
         let turn = turn(a, b, c);
         self.turns[corner] = turn;
         self.wide.push(Wide(turn, Reverse(corner)));
-        self.is_ear[corner] =
-            turn > 0.0 && self.looks > 0 && !self.near.any_within(self.points, [a, b, c], &mut self.looks);
+        self.is_ear[corner] = turn > 0.0
+            && self.visits_left > 0
+            && !self.near.any_within(self.points, [a, b, c], &mut self.visits_left);
         if self.is_ear[corner] {
             self.ears.push(Reverse(corner));
         }
@@ -114,12 +115,12 @@ impl<'a> Ring<'a> {
 
     fn next_to_cut(&mut self) -> usize {
         while let Some(Reverse(corner)) = self.ears.pop() {
-            if self.is_left[corner] && self.is_ear[corner] {
+            if self.is_remaining[corner] && self.is_ear[corner] {
                 return corner;
             }
         }
         while let Some(Wide(turn, Reverse(corner))) = self.wide.pop() {
-            if self.is_left[corner] && self.turns[corner].to_bits() == turn.to_bits() {
+            if self.is_remaining[corner] && self.turns[corner].to_bits() == turn.to_bits() {
                 return corner;
             }
         }
@@ -127,16 +128,16 @@ impl<'a> Ring<'a> {
     }
 
     fn first(&self) -> usize {
-        self.is_left.iter().position(|&left| left).unwrap_or(0)
+        self.is_remaining.iter().position(|&remaining| remaining).unwrap_or(0)
     }
 
     fn cut(&mut self, corner: usize) {
         let [before, _, after] = self.around(corner);
-        self.is_left[corner] = false;
+        self.is_remaining[corner] = false;
         self.near.remove(corner);
         (self.after[before], self.before[after]) = (after, before);
-        self.look(before);
-        self.look(after);
+        self.classify(before);
+        self.classify(after);
     }
 }
 
@@ -147,14 +148,14 @@ struct Boxes {
     order: Vec<usize>,
     /// Leaf of each point.
     leaf_of: Vec<usize>,
-    is_left: Vec<bool>,
+    is_remaining: Vec<bool>,
 }
 
 struct Node {
     low: Point,
     high: Point,
     /// Remaining points below it.
-    left: usize,
+    remaining: usize,
     parent: usize,
     /// The first of two children, or none.
     children: Option<[usize; 2]>,
@@ -168,7 +169,7 @@ impl Boxes {
             nodes: Vec::new(),
             order: (0..points.len()).collect(),
             leaf_of: vec![0; points.len()],
-            is_left: vec![true; points.len()],
+            is_remaining: vec![true; points.len()],
         };
         let mut todo = vec![(0..points.len(), 0, None)];
         while let Some((range, parent, side)) = todo.pop() {
@@ -193,16 +194,16 @@ impl Boxes {
             } else {
                 own.iter().for_each(|&point| out.leaf_of[point] = index);
             }
-            out.nodes.push(Node { low, high, left: range.len(), parent, children: None, range });
+            out.nodes.push(Node { low, high, remaining: range.len(), parent, children: None, range });
         }
         out
     }
 
     fn remove(&mut self, point: usize) {
-        self.is_left[point] = false;
+        self.is_remaining[point] = false;
         let mut at = self.leaf_of[point];
         loop {
-            self.nodes[at].left -= 1;
+            self.nodes[at].remaining -= 1;
             if at == 0 {
                 return;
             }
@@ -211,14 +212,14 @@ impl Boxes {
     }
 
     /// Whether a counter-clockwise triangle contains a remaining point, even on its sides, other than its corners.
-    fn any_within(&self, points: &[Point], triangle: [Point; 3], looks: &mut usize) -> bool {
+    fn any_within(&self, points: &[Point], triangle: [Point; 3], visits_left: &mut usize) -> bool {
         let sides = [0, 1, 2].map(|i| (triangle[i], triangle[(i + 1) % 3]));
         let holds = |p: Point| sides.iter().all(|&(a, b)| turn(a, b, p) >= 0.0) && !triangle.contains(&p);
         let mut todo = vec![0];
         while let Some(index) = todo.pop() {
             let node = &self.nodes[index];
-            *looks = looks.saturating_sub(1);
-            if node.left == 0 {
+            *visits_left = visits_left.saturating_sub(1);
+            if node.remaining == 0 {
                 continue;
             }
             let corners = [node.low, [node.high[0], node.low[1]], node.high, [node.low[0], node.high[1]]];
@@ -234,7 +235,7 @@ impl Boxes {
                 Some(children) => todo.extend(children),
                 None => {
                     let own = &self.order[node.range.clone()];
-                    if own.iter().any(|&point| self.is_left[point] && holds(points[point])) {
+                    if own.iter().any(|&point| self.is_remaining[point] && holds(points[point])) {
                         return true;
                     }
                 }

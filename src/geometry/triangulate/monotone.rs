@@ -3,7 +3,7 @@
 //! Diagonals from the corners where the polygon turns back against the sweep cut it into pieces that are monotone along x, and each of
 //! those is cut from left to right (de Berg et al., Computational Geometry, 3rd ed., sections 3.2 and 3.3): n corners take some n log n
 //! steps. Predicates are exact, on integers. For a polygon that touches or crosses itself, diagonals may cross, or pieces not be monotone:
-//! the former are left out, the latter cut ear by ear.
+//! the former are left out, the latter triangulated by ear clipping.
 
 use super::ear_clipping;
 use super::ear_clipping::Point;
@@ -270,9 +270,9 @@ fn cut_monotone(positions: &[[i64; 2]], rank: &[usize], piece: &[usize], out: &m
     if !(0..last).all(rises) || (last..count).any(rises) {
         return false;
     }
-    let mut good = true;
+    let mut is_valid = true;
     let mut add = |a: usize, b: usize, c: usize| {
-        good &= turn(positions[a], positions[b], positions[c]) >= 0;
+        is_valid &= turn(positions[a], positions[b], positions[c]) >= 0;
         out.push([a, b, c]);
     };
     // The lower side counts up from the first corner, the upper one down to it.
@@ -311,5 +311,5 @@ fn cut_monotone(positions: &[[i64; 2]], rank: &[usize], piece: &[usize], out: &m
         }
         stack.push((next, is_lower));
     }
-    good
+    is_valid
 }

@@ -11,10 +11,10 @@ use crate::error::{Error, Result};
 /// Extension of files that are not finished.
 const PART: &str = "part";
 
-/// Number of files begun by this process.
-static TURN: AtomicU64 = AtomicU64::new(0);
-/// Files that are not finished.
-static BEGUN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+/// Number of temporary files that this process has made.
+static COUNTER: AtomicU64 = AtomicU64::new(0);
+/// Temporary files that are not finished.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// Writes a file through a temporary neighbour that is synced and renamed; a failure leaves nothing behind. A link stays a link; devices
 /// and pipes are written to directly.
@@ -31,8 +31,8 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
 /// What the operating system or the function reports.
 pub fn write(path: &Path, content: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     let attempt = match target(path) {
-        Target::File(path) => through_neighbour(&path, content),
-        Target::Stream => straight(path, content),
+        Target::File(path) => via_temporary(&path, content),
+        Target::Stream => append_directly(path, content),
     };
     attempt.map_err(|error| Error::io(path, "write", error))
 }
@@ -53,7 +53,7 @@ enum Target {
 fn target(path: &Path) -> Target {
     match std::fs::metadata(path) {
         Err(_) => Target::File(path.to_path_buf()),
-        Ok(there) if !there.is_file() && !there.is_dir() => Target::Stream,
+        Ok(metadata) if !metadata.is_file() && !metadata.is_dir() => Target::Stream,
         Ok(_) if is_open_file(path) => Target::Stream,
         Ok(_) => match std::fs::symlink_metadata(path) {
             Ok(link) if link.is_symlink() => {
@@ -79,23 +79,26 @@ fn is_open_file(path: &Path) -> bool {
     false
 }
 
-/// Appends to existing contents: an open file grows.
-fn straight(path: &Path, content: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> std::io::Result<()> {
+/// Appends to a stream or an open file.
+fn append_directly(
+    path: &Path,
+    content: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+) -> std::io::Result<()> {
     let mut out = BufWriter::new(File::options().append(true).open(path)?);
     content(&mut out)?;
     out.flush()
 }
 
-fn through_neighbour(
+fn via_temporary(
     path: &Path,
     content: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
 ) -> std::io::Result<()> {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     // Processes or threads that write the same file use different temporary files.
-    let turn = TURN.fetch_add(1, Ordering::Relaxed);
-    name.push(format!(".{}-{turn}.{PART}", std::process::id()));
+    let number = COUNTER.fetch_add(1, Ordering::Relaxed);
+    name.push(format!(".{}-{number}.{PART}", std::process::id()));
     let part = path.with_file_name(name);
-    BEGUN.lock().expect("no panic holds this lock").push(part.clone());
+    UNFINISHED.lock().expect("no panic while it is locked").push(part.clone());
     let attempt = || -> std::io::Result<()> {
         let mut out = BufWriter::new(File::create(&part)?);
         content(&mut out)?;
@@ -106,14 +109,14 @@ fn through_neighbour(
     let done = attempt().inspect_err(|_| {
         let _ = std::fs::remove_file(&part);
     });
-    BEGUN.lock().expect("no panic holds this lock").retain(|begun| *begun != part);
+    UNFINISHED.lock().expect("no panic while it is locked").retain(|begun| *begun != part);
     done
 }
 
 /// Removes the unfinished files of this process, for a process that is about to exit.
 pub fn abandon() {
     // The lock is only ever held briefly.
-    if let Ok(begun) = BEGUN.lock() {
+    if let Ok(begun) = UNFINISHED.lock() {
         begun.iter().for_each(|part| {
             let _ = std::fs::remove_file(part);
         });
@@ -122,10 +125,10 @@ pub fn abandon() {
 
 /// The final name of an unfinished temporary file; none for other names.
 pub fn finished_name(name: &str) -> Option<&str> {
-    let (name, turn) = name.strip_suffix(PART)?.strip_suffix('.')?.rsplit_once('.')?;
-    let (process, turn) = turn.split_once('-')?;
+    let (name, number) = name.strip_suffix(PART)?.strip_suffix('.')?.rsplit_once('.')?;
+    let (process, number) = number.split_once('-')?;
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|letter| letter.is_ascii_digit());
-    (is_number(process) && is_number(turn)).then_some(name)
+    (is_number(process) && is_number(number)).then_some(name)
 }
 
 #[cfg(test)]

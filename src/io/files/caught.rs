@@ -17,7 +17,7 @@ thread_local! {
 /// # Errors
 /// What `read` returns; for a panic, that the file is damaged; [`Error::Cancelled`] once readers must stop.
 pub fn caught<T>(path: &Path, read: impl FnOnce() -> Result<T>) -> Result<T> {
-    keep_quiet();
+    silence_panics();
     DEPTH.set(DEPTH.get() + 1);
     let outcome = catch_unwind(AssertUnwindSafe(read));
     DEPTH.set(DEPTH.get() - 1);
@@ -27,7 +27,7 @@ pub fn caught<T>(path: &Path, read: impl FnOnce() -> Result<T>) -> Result<T> {
 }
 
 /// Panics of readers become errors and are not printed; other panics go to the previous panic hook.
-fn keep_quiet() {
+fn silence_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         let before = std::panic::take_hook();

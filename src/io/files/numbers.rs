@@ -3,13 +3,13 @@
 use super::{source, text};
 
 /// Maximum number of bytes that deflate expands a byte to.
-const MOST_INFLATED: u64 = 1032;
+const MAX_INFLATION: u64 = 1032;
 /// Numbers between two checks of the stop flag.
 const PIECE: usize = 1 << 20;
 
 /// Maximum number of bytes that this many deflated bytes can expand to.
-pub(in crate::io) fn most_inflated(bytes: usize) -> u64 {
-    (bytes as u64).saturating_mul(MOST_INFLATED)
+pub(in crate::io) fn max_inflated(bytes: usize) -> u64 {
+    (bytes as u64).saturating_mul(MAX_INFLATION)
 }
 
 /// Byte order of a number.
@@ -37,8 +37,8 @@ pub(in crate::io) enum Kind {
 /// Numbers of one type; integers keep all their 64 bits.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::io) enum Numbers {
-    Whole(Vec<i64>),
-    Real(Vec<f64>),
+    Integers(Vec<i64>),
+    Floats(Vec<f64>),
 }
 
 impl Kind {
@@ -53,7 +53,7 @@ impl Kind {
     }
 
     /// Whether its numbers are floats.
-    pub fn is_real(self) -> bool {
+    pub fn is_float(self) -> bool {
         matches!(self, Self::F32 | Self::F64)
     }
 
@@ -62,9 +62,9 @@ impl Kind {
         matches!(self, Self::I8 | Self::U8 | Self::I16 | Self::U16 | Self::I32)
     }
 
-    /// No numbers yet.
-    pub fn none(self) -> Numbers {
-        if self.is_real() { Numbers::Real(Vec::new()) } else { Numbers::Whole(Vec::new()) }
+    /// An empty array of this type.
+    pub fn empty(self) -> Numbers {
+        if self.is_float() { Numbers::Floats(Vec::new()) } else { Numbers::Integers(Vec::new()) }
     }
 
     /// Appends the numbers in these bytes; an incomplete last one is ignored.
@@ -73,7 +73,7 @@ impl Kind {
     /// An unsigned integer over 2^63 - 1; the stop flag.
     pub fn decode(self, bytes: &[u8], order: Order, out: &mut Numbers) -> Result<(), String> {
         for piece in bytes.chunks(PIECE * self.size()) {
-            source::go_on(0, 1)?;
+            source::check_every(0, 1)?;
             self.decode_piece(piece, order, out)?;
         }
         Ok(())
@@ -91,16 +91,16 @@ impl Kind {
             }};
         }
         match (self, out) {
-            (Self::F32, Numbers::Real(values)) => extend!(values, f64, f32),
-            (Self::F64, Numbers::Real(values)) => extend!(values, f64, f64),
-            (Self::I8, Numbers::Whole(values)) => extend!(values, i64, i8),
-            (Self::U8, Numbers::Whole(values)) => extend!(values, i64, u8),
-            (Self::I16, Numbers::Whole(values)) => extend!(values, i64, i16),
-            (Self::U16, Numbers::Whole(values)) => extend!(values, i64, u16),
-            (Self::I32, Numbers::Whole(values)) => extend!(values, i64, i32),
-            (Self::U32, Numbers::Whole(values)) => extend!(values, i64, u32),
-            (Self::I64, Numbers::Whole(values)) => extend!(values, i64, i64),
-            (Self::U64, Numbers::Whole(values)) => {
+            (Self::F32, Numbers::Floats(values)) => extend!(values, f64, f32),
+            (Self::F64, Numbers::Floats(values)) => extend!(values, f64, f64),
+            (Self::I8, Numbers::Integers(values)) => extend!(values, i64, i8),
+            (Self::U8, Numbers::Integers(values)) => extend!(values, i64, u8),
+            (Self::I16, Numbers::Integers(values)) => extend!(values, i64, i16),
+            (Self::U16, Numbers::Integers(values)) => extend!(values, i64, u16),
+            (Self::I32, Numbers::Integers(values)) => extend!(values, i64, i32),
+            (Self::U32, Numbers::Integers(values)) => extend!(values, i64, u32),
+            (Self::I64, Numbers::Integers(values)) => extend!(values, i64, i64),
+            (Self::U64, Numbers::Integers(values)) => {
                 let before = values.len();
                 extend!(values, i64, i64);
                 if let Some(value) = values[before..].iter().find(|value| **value < 0) {
@@ -119,15 +119,15 @@ impl Kind {
     pub fn read_word(self, word: &[u8], out: &mut Numbers) -> Result<(), String> {
         let text = std::str::from_utf8(word).unwrap_or("");
         let read = match (self, out) {
-            // Parsed as 64 bits first, some numbers would be rounded twice.
-            (Self::F32, Numbers::Real(values)) => {
+            // Parsing via 64 bits would round some numbers twice.
+            (Self::F32, Numbers::Floats(values)) => {
                 text::number::<f32>(word).map(|value| values.push(value.into()))
             }
-            (_, Numbers::Real(values)) => text::number(word).map(|value| values.push(value)),
-            (_, Numbers::Whole(values)) => text.parse().map(|value| values.push(value)).ok(),
+            (_, Numbers::Floats(values)) => text::number(word).map(|value| values.push(value)),
+            (_, Numbers::Integers(values)) => text.parse().map(|value| values.push(value)).ok(),
         };
-        read.ok_or_else(|| match self.is_real() {
-            true => text::no_number(word),
+        read.ok_or_else(|| match self.is_float() {
+            true => text::not_a_number(word),
             false => format!("\"{}\" is not an integer", text::shown(word)),
         })
     }
@@ -137,24 +137,24 @@ impl Numbers {
     /// Number of values.
     pub fn count(&self) -> usize {
         match self {
-            Self::Whole(values) => values.len(),
-            Self::Real(values) => values.len(),
+            Self::Integers(values) => values.len(),
+            Self::Floats(values) => values.len(),
         }
     }
 
-    /// All as floats.
-    pub fn into_reals(self) -> Vec<f64> {
+    /// All values as floats.
+    pub fn into_floats(self) -> Vec<f64> {
         match self {
-            Self::Whole(values) => values.into_iter().map(|value| value as f64).collect(),
-            Self::Real(values) => values,
+            Self::Integers(values) => values.into_iter().map(|value| value as f64).collect(),
+            Self::Floats(values) => values,
         }
     }
 
-    /// Appends those of another array of the same type.
+    /// Appends the values of another array of the same type.
     pub fn append(&mut self, other: Self) {
         match (self, other) {
-            (Self::Whole(values), Self::Whole(more)) => values.extend(more),
-            (Self::Real(values), Self::Real(more)) => values.extend(more),
+            (Self::Integers(values), Self::Integers(more)) => values.extend(more),
+            (Self::Floats(values), Self::Floats(more)) => values.extend(more),
             _ => unreachable!("arrays of one type are added"),
         }
     }
@@ -168,7 +168,7 @@ mod tests {
     fn every_type_is_read_in_both_orders_and_as_text() {
         let read = |kind: Kind, big: &[u8], word: &str| {
             let little: Vec<u8> = big.iter().rev().copied().collect();
-            let (mut a, mut b, mut c) = (kind.none(), kind.none(), kind.none());
+            let (mut a, mut b, mut c) = (kind.empty(), kind.empty(), kind.empty());
             kind.decode(big, Order::Big, &mut a).unwrap();
             kind.decode(&little, Order::Little, &mut b).unwrap();
             kind.read_word(word.as_bytes(), &mut c).unwrap();
@@ -187,9 +187,9 @@ mod tests {
         read(Kind::U64, &(i64::MAX as u64).to_be_bytes(), "9223372036854775807");
         read(Kind::F32, &0.1f32.to_be_bytes(), "0.1");
         read(Kind::F64, &(-1.0e300f64).to_be_bytes(), "-1e300");
-        let mut none = Kind::U64.none();
-        assert!(Kind::U64.decode(&[0xff; 8], Order::Big, &mut none).is_err());
-        assert!(Kind::I32.read_word(b"1.5", &mut Kind::I32.none()).unwrap_err().contains("1.5"));
-        assert!(Kind::F32.read_word(b"\xff", &mut Kind::F32.none()).is_err());
+        let mut empty = Kind::U64.empty();
+        assert!(Kind::U64.decode(&[0xff; 8], Order::Big, &mut empty).is_err());
+        assert!(Kind::I32.read_word(b"1.5", &mut Kind::I32.empty()).unwrap_err().contains("1.5"));
+        assert!(Kind::F32.read_word(b"\xff", &mut Kind::F32.empty()).is_err());
     }
 }

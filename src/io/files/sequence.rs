@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result};
 
 /// Maximum number of digits of a frame number.
-const MOST_DIGITS: usize = 32;
+const MAX_DIGITS: usize = 32;
 
 /// A file name with a placeholder for the frame number, in a folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -23,7 +23,7 @@ impl Pattern {
         let text = path.file_name()?.to_str()?;
         let part = |start: usize, end: usize, digits: usize| {
             // The file system is checked last: most names have no placeholder.
-            (digits <= MOST_DIGITS && !path.is_file()).then(|| Self {
+            (digits <= MAX_DIGITS && !path.is_file()).then(|| Self {
                 folder: path.parent().unwrap_or(Path::new("")).to_path_buf(),
                 before: text[..start].into(),
                 digits,

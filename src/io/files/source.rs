@@ -8,7 +8,7 @@ use std::sync::{Arc, OnceLock};
 
 use crate::error::{Error, Result};
 
-/// What is read from a file; an error says what is wrong with it, without its name.
+/// Contents of a file, or what is wrong with it: a message without the file's name.
 pub type Parsed<T> = std::result::Result<T, String>;
 
 /// Bytes between two checks of the flag.
@@ -36,10 +36,11 @@ pub fn check() -> Result<()> {
     if is_stopped() { Err(Error::Cancelled) } else { Ok(()) }
 }
 
-/// Fails if readers must stop. Called for each item of a file that is parsed; it looks every `piece` items.
+/// Fails if readers must stop. Parsers call it for each item of a file; it checks the flag every `piece` items.
 ///
-/// # Errors Readers must stop. The text is never shown: callers look at the flag.
-pub fn go_on(item: usize, piece: usize) -> Parsed<()> {
+/// # Errors
+/// Readers must stop. The text is never shown: callers check the flag.
+pub fn check_every(item: usize, piece: usize) -> Parsed<()> {
     if item.is_multiple_of(piece) && is_stopped() { Err("stopped".into()) } else { Ok(()) }
 }
 
@@ -76,8 +77,8 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
     let mut file = open(path)?;
     let length = file.metadata().map_err(failed)?.len();
     let mut bytes = Vec::new();
-    let room = usize::try_from(length).ok().and_then(|length| bytes.try_reserve_exact(length + 1).ok());
-    if room.is_none() {
+    let reserved = usize::try_from(length).ok().and_then(|length| bytes.try_reserve_exact(length + 1).ok());
+    if reserved.is_none() {
         return Err(Error::file(path, format!("has {length} bytes, more than there is memory for")));
     }
     loop {

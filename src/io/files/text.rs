@@ -8,7 +8,7 @@ use crate::error::one_line;
 const UTF_8: &[u8] = b"\xef\xbb\xbf";
 const UTF_16: [&[u8]; 2] = [b"\xff\xfe", b"\xfe\xff"];
 /// Maximum number of characters of a word that a message quotes.
-const LONGEST_WORD: usize = 40;
+const MAX_QUOTED: usize = 40;
 
 /// The bytes after a byte order mark, which some programs write.
 ///
@@ -124,7 +124,7 @@ pub(in crate::io) fn coordinate(word: &[u8], origin: f64) -> Option<f32> {
 }
 
 /// The message for a word that is not the expected number.
-pub(in crate::io) fn no_number(word: &[u8]) -> String {
+pub(in crate::io) fn not_a_number(word: &[u8]) -> String {
     let shown = shown(word);
     if has_decimal_comma(word) {
         return format!("\"{shown}\" has a decimal comma: numbers need decimal points");
@@ -141,7 +141,7 @@ pub(in crate::io) fn has_decimal_comma(word: &[u8]) -> bool {
 
 /// A word as a message quotes it.
 pub(in crate::io) fn shown(word: &[u8]) -> String {
-    let text: String = String::from_utf8_lossy(word).chars().take(LONGEST_WORD).collect();
+    let text: String = String::from_utf8_lossy(word).chars().take(MAX_QUOTED).collect();
     one_line(&text)
 }
 
@@ -150,7 +150,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_end_in_every_manner() {
+    fn every_line_end_is_recognised() {
         let found: Vec<(usize, &[u8])> = lines(b"a\nb\r\nc\rd\r\r\n\ne").collect();
         let texts = ["a", "b", "c", "d", "", "", "e"];
         assert_eq!(
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn words_know_their_lines_and_pass_comments_over() {
+    fn words_know_their_lines_and_skip_comments() {
         let mut words = Words::new(b" a b\r\n# c d\rd\n\n\re f # g");
         let mut found = Vec::new();
         while let Some(word) = words.next() {
@@ -178,9 +178,9 @@ mod tests {
             assert_eq!(number::<f64>(word), None, "{}", shown(word));
         }
         assert_eq!(coordinate(b"5000000.125", 5e6), Some(0.125));
-        assert!(no_number(b"-0,5e3").contains("decimal comma"));
+        assert!(not_a_number(b"-0,5e3").contains("decimal comma"));
         for word in [&b"1,2,3"[..], b"1.0,2", b",", b"a,b"] {
-            assert!(no_number(word).ends_with("is not a number"), "{}", shown(word));
+            assert!(not_a_number(word).ends_with("is not a number"), "{}", shown(word));
         }
     }
 

@@ -82,7 +82,7 @@ pub fn read_any_from(path: &Path, origin: DVec3) -> Result<PolygonMesh> {
     let bytes = source::read(path)?;
     let mesh = parse(path, &bytes, origin)?;
     let is_empty = mesh.positions.is_empty() && mesh.ends.is_empty();
-    if !is_empty || extension(path) == "obj" && !obj::is_empty_of_ours(&bytes) {
+    if !is_empty || extension(path) == "obj" && !obj::is_our_empty_file(&bytes) {
         mesh.validate().map_err(|error| Error::file(path, error.to_string()))?;
     }
     Ok(mesh)

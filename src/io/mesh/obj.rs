@@ -22,8 +22,8 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<PolygonMesh
     let mut lines = text::lines(text::without_mark(bytes)?);
     let mut joined = Vec::new();
     while let Some((number, line)) = lines.next() {
-        source::go_on(number, PIECE)?;
-        let read = match continued(line) {
+        source::check_every(number, PIECE)?;
+        let read = match continued_statement(line) {
             None => reader.line(line),
             Some(begin) => {
                 joined.clear();
@@ -31,7 +31,7 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<PolygonMesh
                 for (_, line) in lines.by_ref() {
                     // As white space: the text after the line end begins a new word.
                     joined.push(b' ');
-                    let more = goes_on(line);
+                    let more = without_backslash(line);
                     joined.extend_from_slice(more.unwrap_or(line));
                     if more.is_none() {
                         break;
@@ -46,21 +46,21 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<PolygonMesh
 }
 
 /// A line without the final backslash that continues it on the next line.
-fn goes_on(line: &[u8]) -> Option<&[u8]> {
+fn without_backslash(line: &[u8]) -> Option<&[u8]> {
     line.trim_ascii_end().strip_suffix(b"\\")
 }
 
-/// As [`goes_on`], for the lines that are read: a comment, or the name of a material or group, may end in a meaningless backslash, which
+/// As [`without_backslash`], for the lines that are read: a comment, or the name of a material or group, may end in a meaningless backslash, which
 /// must not swallow the vertex after it.
-fn continued(line: &[u8]) -> Option<&[u8]> {
-    let begin = goes_on(line)?;
+fn continued_statement(line: &[u8]) -> Option<&[u8]> {
+    let begin = without_backslash(line)?;
     let word = begin.trim_ascii_start().split(u8::is_ascii_whitespace).next();
     let is_read = matches!(word, Some(b"v" | b"vt" | b"f"));
     (is_read && !begin.contains(&b'#')).then_some(begin)
 }
 
 /// Whether this is a file that frazil wrote for a mesh without vertices; any other text has no vertices either.
-pub(in crate::io) fn is_empty_of_ours(bytes: &[u8]) -> bool {
+pub(in crate::io) fn is_our_empty_file(bytes: &[u8]) -> bool {
     bytes == EMPTY
 }
 
@@ -69,9 +69,9 @@ pub(in crate::io) fn is_empty_of_ours(bytes: &[u8]) -> bool {
 struct Reader {
     origin: [f64; 3],
     mesh: PolygonMesh,
-    positions: Vec<[f32; 2]>,
-    /// For each corner its index into `positions`, or none.
-    at: Vec<u32>,
+    coordinates: Vec<[f32; 2]>,
+    /// For each corner its index into `coordinates`, or none.
+    corner_uvs: Vec<u32>,
     /// Red, green and blue of the vertices, as long as all have them.
     colours: Vec<[f32; 3]>,
 }
@@ -82,7 +82,7 @@ impl Reader {
         let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
         match words.next() {
             Some(b"v") => self.vertex(words),
-            Some(b"vt") => self.position(words),
+            Some(b"vt") => self.texture_coordinates(words),
             Some(b"f") => self.face(words),
             _ => Ok(()),
         }
@@ -96,7 +96,7 @@ impl Reader {
             *value = read.ok_or_else(|| {
                 let what = "the vertex is not three finite numbers";
                 let has_comma = text::has_decimal_comma(word);
-                if has_comma { format!("{what}: {}", text::no_number(word)) } else { what.into() }
+                if has_comma { format!("{what}: {}", text::not_a_number(word)) } else { what.into() }
             })?;
         }
         self.mesh.positions.push(Vec3::from(position));
@@ -107,10 +107,10 @@ impl Reader {
         Ok(())
     }
 
-    /// Texture coordinates: v is optional. Values that are not finite count as missing when a face refers to them.
-    fn position<'a>(&mut self, mut words: impl Iterator<Item = &'a [u8]>) -> Result<(), String> {
+    /// Reads texture coordinates: v is optional. Values that are not finite count as missing when a face refers to them.
+    fn texture_coordinates<'a>(&mut self, mut words: impl Iterator<Item = &'a [u8]>) -> Result<(), String> {
         let mut next = |default: f32| words.next().map_or(Some(default), number).unwrap_or(f32::NAN);
-        self.positions.push([next(f32::NAN), next(0.0)]);
+        self.coordinates.push([next(f32::NAN), next(0.0)]);
         Ok(())
     }
 
@@ -120,30 +120,30 @@ impl Reader {
         for word in words {
             let mut parts = word.split(|&byte| byte == b'/');
             let vertex = parts.next().and_then(|part| index(part, self.mesh.positions.len()));
-            corners.push(vertex.ok_or_else(|| names(word, "vertex", self.mesh.positions.len()))?);
-            let position = match parts.next() {
+            corners.push(vertex.ok_or_else(|| out_of_range(word, "vertex", self.mesh.positions.len()))?);
+            let uv = match parts.next() {
                 None | Some(b"") => uvs::NONE,
                 Some(part) => {
-                    let position = index(part, self.positions.len());
-                    let position =
-                        position.ok_or_else(|| names(word, "texture coordinates", self.positions.len()))?;
-                    if uvs::is_finite(self.positions[position as usize]) { position } else { uvs::NONE }
+                    let count = self.coordinates.len();
+                    let uv =
+                        index(part, count).ok_or_else(|| out_of_range(word, "texture coordinates", count))?;
+                    if uvs::is_finite(self.coordinates[uv as usize]) { uv } else { uvs::NONE }
                 }
             };
-            self.at.push(position);
+            self.corner_uvs.push(uv);
         }
         self.mesh.push(corners);
         // A face of fewer than three corners is ignored.
         let is_face = self.mesh.corners.len() > begin;
         if !is_face {
-            self.at.truncate(begin);
+            self.corner_uvs.truncate(begin);
         }
         Ok(())
     }
 
     fn finish(self) -> PolygonMesh {
         let (corners, count) = (&self.mesh.corners, self.mesh.positions.len());
-        let uvs = Uvs::of_corners(self.positions, self.at, corners, count);
+        let uvs = Uvs::of_corners(self.coordinates, self.corner_uvs, corners, count);
         let colour = |(channel, name): (usize, &&str)| MeshArray {
             name: name.to_string(),
             on: On::Vertices,
@@ -167,7 +167,7 @@ fn index(word: &[u8], count: usize) -> Option<u32> {
     (0..count as i64).contains(&index).then_some(index as u32)
 }
 
-fn names(word: &[u8], what: &str, count: usize) -> String {
+fn out_of_range(word: &[u8], what: &str, count: usize) -> String {
     format!("the face names {what} {}, but there are {count} before it", text::shown(word))
 }
 
@@ -207,8 +207,8 @@ pub(in crate::io) fn write(
         writeln!(out, "vt {u} {v}")?;
     }
     for (index, triangle) in mesh.triangles.iter().enumerate() {
-        let positions = uvs.indices(&mesh.triangles, index);
-        let [a, b, c] = [0, 1, 2].map(|corner| format!("{}/{}", triangle[corner] + 1, positions[corner] + 1));
+        let indices = uvs.indices(&mesh.triangles, index);
+        let [a, b, c] = [0, 1, 2].map(|corner| format!("{}/{}", triangle[corner] + 1, indices[corner] + 1));
         writeln!(out, "f {a} {b} {c}")?;
     }
     Ok(())

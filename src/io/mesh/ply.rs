@@ -13,7 +13,7 @@ use crate::io::files::{source, text};
 pub(in crate::io) use super::ply_header::{Element, NAMES};
 
 /// Names of a vertex' texture coordinates.
-pub(in crate::io) const POSITIONS: [[&str; 2]; 3] = [["s", "t"], ["u", "v"], ["texture_u", "texture_v"]];
+pub(in crate::io) const UV_NAMES: [[&str; 2]; 3] = [["s", "t"], ["u", "v"], ["texture_u", "texture_v"]];
 
 /// Properties that do not become arrays: positions and normals.
 const NO_ARRAYS: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
@@ -37,7 +37,7 @@ impl Body<'_> {
         row: usize,
         mut take: impl FnMut(usize, f64),
     ) -> Result<(), String> {
-        source::go_on(row, PIECE)?;
+        source::check_every(row, PIECE)?;
         for (n, property) in element.properties.iter().enumerate() {
             let read = match property.list {
                 None => self.reader.number(property.number).map(|value| take(n, value)),
@@ -62,7 +62,7 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<PolygonMesh
     // An element without properties has no rows in the file, whatever its count.
     for element in elements.iter().filter(|element| !element.properties.is_empty()) {
         for row in 0..element.count {
-            source::go_on(row, PIECE)?;
+            source::check_every(row, PIECE)?;
             read_row(&mut reader, element, &mut parsed).map_err(|fault| fault.at(element, row))?;
         }
     }
@@ -76,7 +76,7 @@ struct Parsed {
     /// Names of the vertices' texture coordinates, if any.
     names: Option<[&'static str; 2]>,
     of_vertices: Vec<[f32; 2]>,
-    /// Of the corners: the distinct ones, and each corner's index or none.
+    /// Coordinates of the corners: the distinct ones, and each corner's index or none.
     of_corners: Vec<[f32; 2]>,
     known: HashMap<[u32; 2], u32>,
     at: Vec<u32>,
@@ -117,7 +117,7 @@ impl Parsed {
         let has = |name: &&str| {
             vertex.is_some_and(|vertex| vertex.properties.iter().any(|p| p.name == *name && p.list.is_none()))
         };
-        let names = POSITIONS.into_iter().find(|pair| pair.iter().all(has));
+        let names = UV_NAMES.into_iter().find(|pair| pair.iter().all(has));
         Self {
             origin,
             mesh: PolygonMesh::default(),
@@ -132,19 +132,18 @@ impl Parsed {
 
     /// Adds values to the array of a property, if it is one.
     fn add(&mut self, on: On, property: usize, values: &[f64]) {
-        let is_it = |(index, array): &&mut (usize, MeshArray)| *index == property && array.on == on;
-        if let Some((_, array)) = self.arrays.iter_mut().find(is_it) {
+        let is_match = |(index, array): &&mut (usize, MeshArray)| *index == property && array.on == on;
+        if let Some((_, array)) = self.arrays.iter_mut().find(is_match) {
             array.values.extend_from_slice(values);
         }
     }
 
     /// Adds a face, with two texture coordinates for each corner, one after another, or none.
-    fn face(&mut self, corners: Vec<u32>, positions: &[f64]) {
-        let has = positions.len() == 2 * corners.len();
+    fn face(&mut self, corners: Vec<u32>, face_uvs: &[f64]) {
+        let has_uvs = face_uvs.len() == 2 * corners.len();
         for corner in 0..corners.len() {
-            let position =
-                [0, 1].map(|axis| if has { positions[2 * corner + axis] as f32 } else { f32::NAN });
-            let index = if uvs::is_finite(position) { self.index(position) } else { uvs::NONE };
+            let uv = [0, 1].map(|axis| if has_uvs { face_uvs[2 * corner + axis] as f32 } else { f32::NAN });
+            let index = if uvs::is_finite(uv) { self.index(uv) } else { uvs::NONE };
             self.at.push(index);
         }
         self.mesh.push(corners);
@@ -152,11 +151,12 @@ impl Parsed {
         self.at.truncate(self.mesh.corners.len());
     }
 
-    fn index(&mut self, position: [f32; 2]) -> u32 {
+    /// Index of a corner's coordinates among the distinct ones.
+    fn index(&mut self, uv: [f32; 2]) -> u32 {
         let next = self.of_corners.len() as u32;
-        let index = *self.known.entry(position.map(|value| (value + 0.0).to_bits())).or_insert(next);
+        let index = *self.known.entry(uv.map(|value| (value + 0.0).to_bits())).or_insert(next);
         if index == next {
-            self.of_corners.push(position);
+            self.of_corners.push(uv);
         }
         index
     }
@@ -165,11 +165,10 @@ impl Parsed {
         let (corners, count) = (&self.mesh.corners, self.mesh.positions.len());
         let uvs = match Uvs::of_corners(self.of_corners, self.at, corners, count) {
             None if self.names.is_some() => {
-                let is_missing = |position: &[f32; 2]| !uvs::is_finite(*position);
-                let missing = self.of_vertices.iter().filter(|position| is_missing(position)).count();
-                let known = |position: [f32; 2]| if uvs::is_finite(position) { position } else { [0.0; 2] };
-                let positions = self.of_vertices.into_iter().map(known).collect();
-                Some(Uvs { coordinates: positions, corners: None, missing })
+                let missing = self.of_vertices.iter().filter(|uv| !uvs::is_finite(**uv)).count();
+                let known = |uv: [f32; 2]| if uvs::is_finite(uv) { uv } else { [0.0; 2] };
+                let coordinates = self.of_vertices.into_iter().map(known).collect();
+                Some(Uvs { coordinates, corners: None, missing })
             }
             of_corners => of_corners,
         };
@@ -204,11 +203,11 @@ enum Fault {
 impl Fault {
     /// As a message.
     fn at(self, element: &Element, row: usize) -> String {
-        let position = format_args!("{} {} of {}", element.name, row + 1, element.count);
+        let row = format_args!("{} {} of {}", element.name, row + 1, element.count);
         match self {
-            Self::End => format!("the .ply file ends in {position}"),
-            Self::Text(what) => format!("{position}: {what}"),
-            Self::Count(count) => format!("{position} cannot have {count} entries"),
+            Self::End => format!("the .ply file ends in {row}"),
+            Self::Text(what) => format!("{row}: {what}"),
+            Self::Count(count) => format!("{row} cannot have {count} entries"),
         }
     }
 }
@@ -231,7 +230,7 @@ impl Reader<'_> {
             let length = rest[start..].iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len() - start);
             self.at += start + length;
             let word = &rest[start..start + length];
-            return text::number(word).ok_or_else(|| Fault::Text(text::no_number(word)));
+            return text::number(word).ok_or_else(|| Fault::Text(text::not_a_number(word)));
         }
         let size = number.size();
         let raw = self.bytes.get(self.at..self.at + size).ok_or(Fault::End)?;
@@ -254,8 +253,8 @@ impl Reader<'_> {
 
 /// Reads one row of an element.
 fn read_row(reader: &mut Reader<'_>, element: &Element, parsed: &mut Parsed) -> Result<(), Fault> {
-    let (mut position, mut place) = ([0.0f64; 3], [0.0f64; 2]);
-    let (mut corners, mut places) = (Vec::new(), Vec::new());
+    let (mut position, mut uv) = ([0.0f64; 3], [0.0f64; 2]);
+    let (mut corners, mut face_uvs) = (Vec::new(), Vec::new());
     let is_vertex = element.name == "vertex";
     // The values of a face, whose corners are known only at its end.
     let (mut of_face, mut of_corners) = (Vec::new(), Vec::new());
@@ -269,7 +268,7 @@ fn read_row(reader: &mut Reader<'_>, element: &Element, parsed: &mut Parsed) -> 
                 } else if let Some(axis) =
                     parsed.names.and_then(|names| names.iter().position(|n| *n == name))
                 {
-                    place[axis] = value;
+                    uv[axis] = value;
                 } else if is_vertex {
                     parsed.add(On::Vertices, index, &[value]);
                 } else {
@@ -282,7 +281,7 @@ fn read_row(reader: &mut Reader<'_>, element: &Element, parsed: &mut Parsed) -> 
                     ("face", "vertex_indices" | "vertex_index") => {
                         corners = values.into_iter().map(vertex).collect();
                     }
-                    ("face", "texcoord") => places = values,
+                    ("face", "texcoord") => face_uvs = values,
                     ("tristrips", _) => add_strips(&values, parsed),
                     ("face", _) => of_corners.push((index, values)),
                     _ => {}
@@ -292,10 +291,10 @@ fn read_row(reader: &mut Reader<'_>, element: &Element, parsed: &mut Parsed) -> 
     }
     match element.name.as_str() {
         "vertex" => {
-            let near = [0, 1, 2].map(|axis| (position[axis] - parsed.origin[axis]) as f32);
-            parsed.mesh.positions.push(Vec3::from(near));
+            let position = [0, 1, 2].map(|axis| (position[axis] - parsed.origin[axis]) as f32);
+            parsed.mesh.positions.push(Vec3::from(position));
             if parsed.names.is_some() {
-                parsed.of_vertices.push(place.map(|value| value as f32));
+                parsed.of_vertices.push(uv.map(|value| value as f32));
             }
         }
         "face" => {
@@ -307,14 +306,14 @@ fn read_row(reader: &mut Reader<'_>, element: &Element, parsed: &mut Parsed) -> 
                     }
                 });
             }
-            parsed.face(corners, &places);
+            parsed.face(corners, &face_uvs);
         }
         _ => {}
     }
     Ok(())
 }
 
-/// Values that are not integers from 0 become an index that validation refuses.
+/// A vertex index; other values than integers from 0 become one that validation refuses.
 fn vertex(value: f64) -> u32 {
     if (0.0..f64::from(u32::MAX)).contains(&value) && value.fract() == 0.0 { value as u32 } else { u32::MAX }
 }

@@ -2,7 +2,7 @@
 
 use std::io::{Result, Write};
 
-use super::ply::{NAMES, POSITIONS};
+use super::ply::{NAMES, UV_NAMES};
 use crate::geometry::mesh::attributes::{MeshArray, Number, On};
 use crate::geometry::{TriMesh, Uvs, Vec3};
 
@@ -20,12 +20,12 @@ pub struct Carried<'a> {
 /// Writes binary little-endian PLY.
 pub(in crate::io) fn write(out: &mut dyn Write, mesh: &TriMesh, carried: &Carried<'_>) -> Result<()> {
     let Carried { velocities, uvs, .. } = *carried;
-    let moving = !velocities.is_empty() && velocities.len() == mesh.positions.len();
+    let has_velocities = !velocities.is_empty() && velocities.len() == mesh.positions.len();
     let of_vertices = uvs.filter(|uvs| uvs.corners.is_none());
     let of_corners = uvs.filter(|uvs| uvs.corners.is_some());
     let mut names = vec!["x", "y", "z"];
-    names.extend(moving.then_some(["vx", "vy", "vz"]).into_iter().flatten());
-    names.extend(of_vertices.map(|_| POSITIONS[0]).into_iter().flatten());
+    names.extend(has_velocities.then_some(["vx", "vy", "vz"]).into_iter().flatten());
+    names.extend(of_vertices.map(|_| UV_NAMES[0]).into_iter().flatten());
     let vertices = arrays(carried, On::Vertices, &names);
     let faces = arrays(carried, On::Faces, &["vertex_indices", "texcoord"]);
     let corners = arrays(carried, On::Corners, &["vertex_indices", "texcoord"]);
@@ -46,13 +46,13 @@ pub(in crate::io) fn write(out: &mut dyn Write, mesh: &TriMesh, carried: &Carrie
         .try_for_each(|array| writeln!(out, "property list uchar {} {}", name(array.number), array.name))?;
     writeln!(out, "end_header")?;
     for (vertex, p) in mesh.positions.iter().enumerate() {
-        let velocity = velocities.get(vertex).filter(|_| moving);
-        let position = of_vertices.map(|uvs| uvs.coordinates[vertex]);
-        let values = p.iter().chain(velocity.into_iter().flatten()).chain(position.iter().flatten());
+        let velocity = velocities.get(vertex).filter(|_| has_velocities);
+        let uv = of_vertices.map(|uvs| uvs.coordinates[vertex]);
+        let values = p.iter().chain(velocity.into_iter().flatten()).chain(uv.iter().flatten());
         for value in values {
             out.write_all(&value.to_le_bytes())?;
         }
-        vertices.iter().try_for_each(|array| put(out, array.number, array.values[vertex]))?;
+        vertices.iter().try_for_each(|array| write_number(out, array.number, array.values[vertex]))?;
     }
     for (number, triangle) in mesh.triangles.iter().enumerate() {
         out.write_all(&[3])?;
@@ -67,12 +67,12 @@ pub(in crate::io) fn write(out: &mut dyn Write, mesh: &TriMesh, carried: &Carrie
                 }
             }
         }
-        faces.iter().try_for_each(|array| put(out, array.number, array.values[number]))?;
+        faces.iter().try_for_each(|array| write_number(out, array.number, array.values[number]))?;
         for array in &corners {
             out.write_all(&[3])?;
             array.values[3 * number..3 * number + 3]
                 .iter()
-                .try_for_each(|value| put(out, array.number, *value))?;
+                .try_for_each(|value| write_number(out, array.number, *value))?;
         }
     }
     Ok(())
@@ -93,7 +93,7 @@ fn name(number: Number) -> &'static str {
     NAMES.iter().find(|(_, named)| *named == number).map_or("float", |(names, _)| names[0])
 }
 
-fn put(out: &mut dyn Write, number: Number, value: f64) -> Result<()> {
+fn write_number(out: &mut dyn Write, number: Number, value: f64) -> Result<()> {
     match number {
         Number::I8 => out.write_all(&(value as i8).to_le_bytes()),
         Number::U8 => out.write_all(&(value as u8).to_le_bytes()),

@@ -11,6 +11,7 @@ use crate::io::files::{source, text};
 /// Triangles between two checks of the stop flag.
 const PIECE: usize = 1 << 14;
 
+/// Bytes of a triangle in a binary file, and of the normal at its start.
 const TRIANGLE: usize = 50;
 const NORMAL: usize = 12;
 
@@ -20,7 +21,7 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<(PolygonMes
     let length = HEADER + count * TRIANGLE;
     if bytes.len() != length || bytes.len() < HEADER {
         let text = text::without_mark(bytes)?;
-        if stl_text::is_one(text) {
+        if stl_text::is_text_stl(text) {
             return stl_text::parse(text, origin);
         }
         if !bytes[..bytes.len().min(HEADER)].contains(&0) {
@@ -32,13 +33,13 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<(PolygonMes
     })?;
     let mut joined = Joined::default();
     for (number, triangle) in bytes[HEADER..length].chunks_exact(TRIANGLE).enumerate() {
-        source::go_on(number, PIECE)?;
+        source::check_every(number, PIECE)?;
         let value = |at: usize| {
             let raw = &triangle[NORMAL + 4 * at..][..4];
             f32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]])
         };
         for corner in 0..3 {
-            let position = [0, 1, 2].map(|axis| less(value(3 * corner + axis), origin[axis]));
+            let position = [0, 1, 2].map(|axis| subtract(value(3 * corner + axis), origin[axis]));
             let corner = joined.corner(position);
             joined.mesh.corners.push(corner);
         }
@@ -50,7 +51,7 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<(PolygonMes
     Ok((joined.mesh, warning))
 }
 
-fn less(value: f32, origin: f64) -> f32 {
+fn subtract(value: f32, origin: f64) -> f32 {
     if origin == 0.0 { value } else { (f64::from(value) - origin) as f32 }
 }
 

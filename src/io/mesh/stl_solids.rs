@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use crate::geometry::{PolygonMesh, Vec3};
 
-/// Bytes of a binary file before its triangles, of each triangle, and of the normal at its start.
+/// Bytes of a binary file before its triangles.
 pub(in crate::io) const HEADER: usize = 84;
 
 /// A mesh whose corners are joined if they have the same position.

@@ -16,7 +16,7 @@ const PIECE: usize = 1 << 14;
 const NORMAL: usize = 4;
 
 /// Whether a file, without its byte order mark, begins like a text STL.
-pub(in crate::io) fn is_one(bytes: &[u8]) -> bool {
+pub(in crate::io) fn is_text_stl(bytes: &[u8]) -> bool {
     // A binary file may begin with any word, but its triangle count is followed by a zero byte, which no text contains.
     let head = &bytes[..bytes.len().min(super::stl_solids::HEADER)];
     let first = Words::new(bytes).next();
@@ -33,7 +33,7 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<(PolygonMes
     let mut is_open = false;
     while let Some(word) = reader.words.next() {
         if is(word, "facet") {
-            source::go_on(reader.facets, PIECE)?;
+            source::check_every(reader.facets, PIECE)?;
             reader.facet()?;
             is_open = true;
         } else if is(word, "solid") {
@@ -128,7 +128,7 @@ impl<'a> Reader<'a> {
             let word = self.next()?;
             let line = self.words.line;
             let read = text::coordinate(word, self.origin[axis]);
-            *value = read.ok_or_else(|| format!("line {line}: {}", text::no_number(word)))?;
+            *value = read.ok_or_else(|| format!("line {line}: {}", text::not_a_number(word)))?;
             if !value.is_finite() {
                 return Err(format!("line {line}: \"{}\" is not a finite number", text::shown(word)));
             }

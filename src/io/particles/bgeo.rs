@@ -13,17 +13,17 @@ use flate2::write::GzEncoder;
 use super::ParticleColumns;
 use crate::error::fail_if;
 use crate::geometry::points::{Points, Values};
-use crate::io::files::numbers::{Kind, Numbers, Order, most_inflated};
+use crate::io::files::numbers::{Kind, Numbers, Order, max_inflated};
 use crate::io::files::source;
 
-/// What Houdini's own files are, and what to do instead.
-pub(in crate::io) const HOUDINIS: &str = "is Houdini's own format since version 12 (JSON), not classic .bgeo: save it from Houdini as \
+/// Message about files in Houdini's own format.
+pub(in crate::io) const HOUDINI_JSON: &str = "is Houdini's own format since version 12 (JSON), not classic .bgeo: save it from Houdini as \
                                    .bhclassic (which is classic .bgeo), as .ply, or as .vdb with VDB Points";
 
 /// Maximum number of attributes, and of numbers in one; more means damage.
-const MOST: u32 = 1 << 12;
+const MAX_ATTRIBUTES: u32 = 1 << 12;
 /// Maximum number of texts in an attribute's list; more means damage.
-const MOST_TEXTS: u32 = 1 << 20;
+const MAX_TEXTS: u32 = 1 << 20;
 /// Bytes of points that are read at a time.
 const PIECE: usize = 1 << 20;
 /// Bytes of a number.
@@ -49,18 +49,18 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<ParticleColumns, String> {
         (0..head.attributes).map(|_| Field::read(&mut *reader)).collect::<Result<Vec<_>, _>>()?;
     let row = WORD * (4 + fields.iter().map(|field| field.size).sum::<usize>());
     // A damaged count must not cause an allocation.
-    let room = if is_packed { most_inflated(bytes.len()) } else { bytes.len() as u64 };
+    let room = if is_packed { max_inflated(bytes.len()) } else { bytes.len() as u64 };
     if (head.points as u64).saturating_mul(row as u64) > room {
         let (points, bytes) = (head.points, bytes.len());
         return Err(format!(
             "the file says that it has {points} particles, and is too short for them ({bytes} bytes)"
         ));
     }
-    let mut positions = Kind::F32.none();
+    let mut positions = Kind::F32.empty();
     let mut rows = vec![0; (PIECE / row).clamp(1, head.points.max(1)) * row];
     let mut done = 0;
     while done < head.points {
-        source::go_on(0, 1)?;
+        source::check_every(0, 1)?;
         let count = (rows.len() / row).min(head.points - done);
         let piece = &mut rows[..count * row];
         reader.read_exact(piece).map_err(|error| match error.kind() {
@@ -92,11 +92,11 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<ParticleColumns, String> {
     Ok(found)
 }
 
-/// The checksum after the last byte shows whether a file is complete and undamaged.
+/// Reads the rest, because the checksum after the last byte shows whether the file is complete and undamaged.
 fn read_to_the_end(reader: &mut dyn Read) -> Result<(), String> {
     let mut rest = vec![0; PIECE];
     loop {
-        source::go_on(0, 1)?;
+        source::check_every(0, 1)?;
         if reader.read(&mut rest).map_err(|error| damaged(&error))? == 0 {
             return Ok(());
         }
@@ -119,7 +119,7 @@ impl Head {
     fn read(reader: &mut dyn Read) -> Result<Self, String> {
         let magic: [u8; 5] = take(reader)?;
         match &magic {
-            [0x7f, b'N', b'S', b'J', b'b'] | [b'[', ..] => return Err(HOUDINIS.into()),
+            [0x7f, b'N', b'S', b'J', b'b'] | [b'[', ..] => return Err(HOUDINI_JSON.into()),
             b"PGEOM" => return Err("is a .geo file (classic, as text): save it as .bhclassic".into()),
             b"BgeoV" => {}
             _ => return Err("is not a classic .bgeo file".into()),
@@ -134,7 +134,7 @@ impl Head {
             *count = word(reader)?;
         }
         let [points, _, _, _, attributes, ..] = counts;
-        fail_if(points > i32::MAX as u32 || attributes > MOST, || {
+        fail_if(points > i32::MAX as u32 || attributes > MAX_ATTRIBUTES, || {
             format!("the file is damaged: it has {points} particles with {attributes} attributes")
         })?;
         Ok(Self { points: points as usize, attributes })
@@ -146,7 +146,9 @@ impl Field {
         let name = text(reader)?;
         let size = u32::from(u16::from_be_bytes(take(reader)?));
         let number = word(reader)?;
-        fail_if(size > MOST, || format!("the file is damaged: attribute \"{name}\" has {size} components"))?;
+        fail_if(size > MAX_ATTRIBUTES, || {
+            format!("the file is damaged: attribute \"{name}\" has {size} components")
+        })?;
         let kind = match number {
             // Floats, and vectors, which rotate with their owner.
             0 | 5 => Some(Kind::F32),
@@ -164,12 +166,17 @@ impl Field {
             (0..size).try_for_each(|_| word(reader).map(drop))?;
         } else {
             let count = word(reader)?;
-            if count > MOST_TEXTS {
+            if count > MAX_TEXTS {
                 return Err(format!("the file is damaged: attribute \"{name}\" has {count} texts"));
             }
             (0..count).try_for_each(|_| text(reader).map(drop))?;
         }
-        Ok(Self { name, kind: kind.unwrap_or(Kind::I32), size: size as usize, numbers: kind.map(Kind::none) })
+        Ok(Self {
+            name,
+            kind: kind.unwrap_or(Kind::I32),
+            size: size as usize,
+            numbers: kind.map(Kind::empty),
+        })
     }
 }
 
@@ -194,7 +201,7 @@ fn text(reader: &mut dyn Read) -> Result<String, String> {
 /// # Errors
 /// 64-bit integers that are too large; too many points or attributes.
 pub(in crate::io) fn check(points: &Points) -> Result<(), String> {
-    if points.count() > i32::MAX as usize || points.attributes.len() > MOST as usize {
+    if points.count() > i32::MAX as usize || points.attributes.len() > MAX_ATTRIBUTES as usize {
         return Err("there are more points or attributes than .bgeo can hold".into());
     }
     for attribute in &points.attributes {

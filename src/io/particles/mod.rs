@@ -112,17 +112,17 @@ fn format(path: &Path) -> Option<Format> {
 }
 
 /// Whether a file's name is that of a particle file: those of [`READ`], and .bgeo.sc, which [`read`] refuses with advice.
-pub fn is_named(path: &Path) -> bool {
+pub fn has_extension_of_particles(path: &Path) -> bool {
     format(path).is_some()
 }
 
 /// Advice about a file of this name that no reader accepts; none for other names.
 pub fn advice(path: &Path) -> Option<&'static str> {
-    (format(path) == Some(Format::BgeoSc)).then_some(bgeo::HOUDINIS)
+    (format(path) == Some(Format::BgeoSc)).then_some(bgeo::HOUDINI_JSON)
 }
 
 /// Whether [`write()`] accepts a file of this name.
-pub fn is_written(path: &Path) -> bool {
+pub fn can_write(path: &Path) -> bool {
     matches!(format(path), Some(Format::Bgeo | Format::Ply | Format::Xyz))
 }
 
@@ -144,7 +144,7 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<ParticleData> {
     let found = |parse: fn(&[u8]) -> Parsed<ParticleColumns>| parse(bytes).map(ParticleColumns::into_parts);
     let parse = || match format(path) {
         Some(Format::Bgeo) => found(bgeo::parse),
-        Some(Format::BgeoSc) => Err(bgeo::HOUDINIS.into()),
+        Some(Format::BgeoSc) => Err(bgeo::HOUDINI_JSON.into()),
         Some(Format::Ply) => ply::parse(bytes).map(|cloud| (cloud, Vec::new())),
         Some(Format::Vtk) => found(vtk::parse),
         Some(Format::Vtu) => found(vtu::parse),
@@ -195,13 +195,13 @@ fn listed(extensions: &[&str]) -> String {
 }
 
 /// Rounding of a position (m) that causes a warning.
-const MOST_MOVED: f64 = 1e-3;
+const MAX_ROUNDING: f64 = 1e-3;
 
 fn warn_of_rounding(path: &Path, points: &Points) {
     let farthest = points.bounds().map_or(0.0, |(low, high)| low.amax().max(high.amax()));
-    let moved = spacing(farthest) / 2.0;
-    if moved > MOST_MOVED {
-        log::warn!("{}: positions in 32 bits are rounded, by up to {moved} m", path.display());
+    let rounding = spacing(farthest) / 2.0;
+    if rounding > MAX_ROUNDING {
+        log::warn!("{}: positions in 32 bits are rounded, by up to {rounding} m", path.display());
     }
 }
 
@@ -217,7 +217,7 @@ pub(super) struct ParticleColumns {
 impl ParticleColumns {
     /// Positions, three numbers each; an incomplete last one is ignored.
     pub fn new(numbers: Numbers) -> Self {
-        let numbers = numbers.into_reals();
+        let numbers = numbers.into_floats();
         let positions = numbers
             .chunks_exact(3)
             .map(|position| DVec3::new(position[0], position[1], position[2]))
@@ -246,7 +246,7 @@ impl ParticleColumns {
             return Ok(());
         }
         let values = if components == 3 {
-            let numbers = numbers.into_reals();
+            let numbers = numbers.into_floats();
             vectors(numbers.chunks_exact(3).map(|v| [0, 1, 2].map(|axis| v[axis] as f32)))
         } else {
             scalars(name, numbers, kind.fits_int())?
@@ -274,25 +274,25 @@ fn vectors(all: impl Iterator<Item = [f32; 3]>) -> Values {
 /// An attribute of one number for each particle: its type depends on its name, on that of the numbers, and on whether integers fit 32 bits.
 fn scalars(name: &str, numbers: Numbers, fits_int: bool) -> Parsed<Values> {
     Ok(match (name, numbers) {
-        ("id", Numbers::Real(numbers)) => Values::Long(shared(whole(name, &numbers)?, |&id| id)),
+        ("id", Numbers::Floats(numbers)) => Values::Long(shared(integers(name, &numbers)?, |&id| id)),
         ("active" | "trapped", numbers) => {
-            let yes = numbers.into_reals().into_iter().map(|value| value != 0.0).collect();
+            let yes = numbers.into_floats().into_iter().map(|value| value != 0.0).collect();
             Values::Bool(shared(yes, |&yes| yes))
         }
-        (_, Numbers::Real(numbers)) => {
+        (_, Numbers::Floats(numbers)) => {
             let floats = numbers.into_iter().map(|value| value as f32).collect();
             Values::Float(shared(floats, |value| value.to_bits()))
         }
-        (_, Numbers::Whole(numbers)) if name != "id" && fits_int => {
-            let whole = numbers.into_iter().map(|value| value as i32).collect();
-            Values::Int(shared(whole, |&value| value))
+        (_, Numbers::Integers(numbers)) if name != "id" && fits_int => {
+            let integers = numbers.into_iter().map(|value| value as i32).collect();
+            Values::Int(shared(integers, |&value| value))
         }
-        (_, Numbers::Whole(numbers)) => Values::Long(shared(numbers, |&value| value)),
+        (_, Numbers::Integers(numbers)) => Values::Long(shared(numbers, |&value| value)),
     })
 }
 
-/// Numbers as 64-bit integers.
-fn whole(name: &str, column: &[f64]) -> Parsed<Vec<i64>> {
+/// Floats as 64-bit integers, if all are integers.
+fn integers(name: &str, column: &[f64]) -> Parsed<Vec<i64>> {
     let exact = |(row, &value): (usize, &f64)| {
         let is_whole = value.fract() == 0.0 && value.abs() <= (1u64 << 53) as f64;
         is_whole

@@ -7,7 +7,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use super::{ParticleData, scalars, vectors, whole};
+use super::{ParticleData, integers, scalars, vectors};
 use crate::error::{Error, Result, fail_if};
 use crate::geometry::DVec3;
 use crate::geometry::mesh::spacing;
@@ -20,8 +20,8 @@ use crate::io::mesh::ply::Element;
 
 /// Prefix of the comment with the voxel size (m).
 const VOXEL: &str = "frazil voxel_size";
-/// Maximum movement of a point by rounding (voxels) for which its position is still written in 32 bits.
-const MOST_MOVED: f64 = 1e-3;
+/// Maximum rounding of a position (voxels) for which its position is still written in 32 bits.
+const MAX_ROUNDING: f64 = 1e-3;
 
 /// Whether a .ply file has vertices and no faces. A file that has neither holds a mesh if it declares zero faces, and points if it does not
 /// declare faces.
@@ -93,11 +93,14 @@ fn attributes(vertices: &Element, names: &[String], columns: &mut [Vec<f64>]) ->
                 (stem, vectors((0..vertices.count).map(vector)))
             }
             None => {
-                let is_real = property.is_float() || ["id", "active", "trapped"].contains(&&**name);
+                let is_float = property.is_float() || ["id", "active", "trapped"].contains(&&**name);
                 let column = std::mem::take(&mut columns[n]);
-                let fits_int = !is_real && column.iter().all(|&value| f64::from(value as i32) == value);
-                let numbers =
-                    if is_real { Numbers::Real(column) } else { Numbers::Whole(whole(name, &column)?) };
+                let fits_int = !is_float && column.iter().all(|&value| f64::from(value as i32) == value);
+                let numbers = if is_float {
+                    Numbers::Floats(column)
+                } else {
+                    Numbers::Integers(integers(name, &column)?)
+                };
                 (&**name, scalars(name, numbers, fits_int)?)
             }
         };
@@ -111,8 +114,8 @@ fn attributes(vertices: &Element, names: &[String], columns: &mut [Vec<f64>]) ->
 /// # Errors
 /// 64-bit integers that a `double` does not hold; what the operating system reports.
 pub fn write(path: &Path, points: &Points) -> Result<()> {
-    let plain = all_plain(points).map_err(|what| Error::file(path, what))?;
-    atomic::write(path, |out| write_to(out, points, &plain, true))
+    let ply_attribute = ply_attributes(points).map_err(|what| Error::file(path, what))?;
+    atomic::write(path, |out| write_to(out, points, &ply_attribute, true))
 }
 
 /// As [`write()`], without the voxel size: for points that have voxels only because [`Points`] require them.
@@ -120,8 +123,8 @@ pub fn write(path: &Path, points: &Points) -> Result<()> {
 /// # Errors
 /// As [`write()`].
 pub fn write_without_voxels(path: &Path, points: &Points) -> Result<()> {
-    let plain = all_plain(points).map_err(|what| Error::file(path, what))?;
-    atomic::write(path, |out| write_to(out, points, &plain, false))
+    let ply_attribute = ply_attributes(points).map_err(|what| Error::file(path, what))?;
+    atomic::write(path, |out| write_to(out, points, &ply_attribute, false))
 }
 
 /// The bytes of such a file.
@@ -129,25 +132,25 @@ pub fn write_without_voxels(path: &Path, points: &Points) -> Result<()> {
 /// # Errors
 /// As [`write()`].
 pub fn to_bytes(points: &Points) -> Result<Vec<u8>> {
-    let plain = all_plain(points).map_err(Error::Argument)?;
+    let ply_attribute = ply_attributes(points).map_err(Error::Argument)?;
     let mut out = Vec::new();
-    write_to(&mut out, points, &plain, true).map_err(|error| Error::Internal(error.to_string()))?;
+    write_to(&mut out, points, &ply_attribute, true).map_err(|error| Error::Internal(error.to_string()))?;
     Ok(out)
 }
 
-fn all_plain(points: &Points) -> Parsed<Vec<Plain<'_>>> {
-    points.attributes.iter().map(plain).collect()
+fn ply_attributes(points: &Points) -> Parsed<Vec<PlyAttribute<'_>>> {
+    points.attributes.iter().map(ply_attribute).collect()
 }
 
 /// An attribute in the form in which PLY holds it.
-struct Plain<'a> {
+struct PlyAttribute<'a> {
     /// Type and names of its properties.
     kind: &'static str,
     names: Vec<String>,
     values: &'a Values,
 }
 
-fn plain(attribute: &Attribute) -> Parsed<Plain<'_>> {
+fn ply_attribute(attribute: &Attribute) -> Parsed<PlyAttribute<'_>> {
     let Attribute { name, values } = attribute;
     let kind = match values {
         Values::Float(_) | Values::Vector(_) => "float",
@@ -171,18 +174,18 @@ fn plain(attribute: &Attribute) -> Parsed<Plain<'_>> {
     // The words of a header are separated by spaces.
     match names.iter().find(|name| name.contains(char::is_whitespace)) {
         Some(name) => Err(format!("the name \"{name}\" has a space, which .ply cannot hold")),
-        None => Ok(Plain { kind, names, values }),
+        None => Ok(PlyAttribute { kind, names, values }),
     }
 }
 
 fn write_to(
     out: &mut dyn Write,
     points: &Points,
-    attributes: &[Plain<'_>],
+    attributes: &[PlyAttribute<'_>],
     keeps_voxels: bool,
 ) -> std::io::Result<()> {
     let farthest = points.bounds().map_or(0.0, |(low, high)| low.amax().max(high.amax()));
-    let is_far = spacing(farthest) > MOST_MOVED * points.voxel_size;
+    let is_far = spacing(farthest) > MAX_ROUNDING * points.voxel_size;
     let positions = if is_far { "double" } else { "float" };
     let voxel = if keeps_voxels { format!("comment {VOXEL} {}\n", points.voxel_size) } else { String::new() };
     let mut head =
@@ -190,7 +193,7 @@ fn write_to(
     for axis in ["x", "y", "z"] {
         head += &format!("property {positions} {axis}\n");
     }
-    for Plain { kind, names, .. } in attributes {
+    for PlyAttribute { kind, names, .. } in attributes {
         names.iter().for_each(|name| head += &format!("property {kind} {name}\n"));
     }
     out.write_all((head + "end_header\n").as_bytes())?;
@@ -203,7 +206,7 @@ fn write_to(
                 false => row.extend((*part as f32).to_le_bytes()),
             }
         }
-        for Plain { kind, values, .. } in attributes {
+        for PlyAttribute { kind, values, .. } in attributes {
             match values {
                 Values::Float(column) => row.extend(column.get(point).to_le_bytes()),
                 Values::Int(column) => row.extend(column.get(point).to_le_bytes()),
@@ -239,9 +242,10 @@ mod tests {
             points.set("active", Values::Bool(Column::Each(vec![true, false, true])));
             points.set("trapped", Values::Bool(Column::Each(vec![false, false, true])));
             points.set("source_frame", Values::Int(Column::Each(vec![-1, 2, 3])));
-            let plain: Vec<Plain<'_>> = points.attributes.iter().map(|a| plain(a).unwrap()).collect();
+            let ply_attribute: Vec<PlyAttribute<'_>> =
+                points.attributes.iter().map(|a| ply_attribute(a).unwrap()).collect();
             let mut bytes = Vec::new();
-            write_to(&mut bytes, &points, &plain, true).unwrap();
+            write_to(&mut bytes, &points, &ply_attribute, true).unwrap();
             let back = parse(&bytes).unwrap().into_points(None).unwrap();
             assert_eq!((&back.attributes, back.voxel_size), (&points.attributes, 0.5));
             for point in 0..3 {

@@ -10,7 +10,7 @@ use crate::io::files::numbers::{Kind, Numbers, Order};
 use crate::io::files::{source, text};
 
 /// Maximum length (bytes) of a keyword line: a longer line is not one.
-const LONGEST: usize = 1 << 12;
+const MAX_LINE: usize = 1 << 12;
 /// Words between two checks of the stop flag.
 const PIECE: usize = 1 << 16;
 
@@ -232,19 +232,19 @@ impl<'a> Reader<'a> {
         };
         self.at += skip;
         let line = self.raw_line();
-        let text = String::from_utf8_lossy(&line[..line.len().min(LONGEST)]).trim().to_string();
+        let text = String::from_utf8_lossy(&line[..line.len().min(MAX_LINE)]).trim().to_string();
         // Some Unicode spaces are not ASCII spaces.
-        if line.len() > LONGEST || text.is_empty() {
+        if line.len() > MAX_LINE || text.is_empty() {
             return Err(format!("\"{}\" is not a line of a .vtk file", shown(&text)));
         }
         Ok(Some(text))
     }
 
     /// As [`Self::line`], if it has the expected form; otherwise nothing is consumed.
-    fn line_if(&mut self, is_it: impl Fn(&[&str]) -> bool) -> Option<String> {
+    fn line_if(&mut self, is_expected: impl Fn(&[&str]) -> bool) -> Option<String> {
         let before = self.at;
         let line = self.line().ok().flatten();
-        let line = line.filter(|line| is_it(&line.split_whitespace().collect::<Vec<_>>()));
+        let line = line.filter(|line| is_expected(&line.split_whitespace().collect::<Vec<_>>()));
         if line.is_none() {
             self.at = before;
         }
@@ -345,13 +345,13 @@ impl<'a> Reader<'a> {
             Type::Bit if self.is_binary => return self.bits(count),
             Type::Bit | Type::Text => Kind::U8,
         };
-        let mut out = kind.none();
+        let mut out = kind.empty();
         if self.is_binary {
             kind.decode(self.take(count.checked_mul(kind.size()))?, Order::Big, &mut out)?;
             return Ok(out);
         }
         for n in 0..count {
-            source::go_on(n, PIECE)?;
+            source::check_every(n, PIECE)?;
             kind.read_word(self.word()?, &mut out)?;
         }
         Ok(out)
@@ -359,7 +359,7 @@ impl<'a> Reader<'a> {
 
     fn bits(&mut self, count: usize) -> Result<Numbers, String> {
         let bytes = self.take(Some(count.div_ceil(8)))?;
-        Ok(Numbers::Whole((0..count).map(|n| i64::from(bytes[n / 8] >> (7 - n % 8) & 1)).collect()))
+        Ok(Numbers::Integers((0..count).map(|n| i64::from(bytes[n / 8] >> (7 - n % 8) & 1)).collect()))
     }
 
     /// Skips `count` numbers or texts.
@@ -374,7 +374,7 @@ impl<'a> Reader<'a> {
 
     /// Skips a text: a line or, in binary files, its bytes after a length whose two highest bits give the number of bytes that it occupies.
     fn skip_text(&mut self) -> Result<(), String> {
-        let first = *self.rest().first().ok_or_else(cut)?;
+        let first = *self.rest().first().ok_or_else(truncated)?;
         if !self.is_binary {
             self.raw_line();
             return Ok(());
@@ -387,7 +387,7 @@ impl<'a> Reader<'a> {
 
     /// The next bytes, if there are enough.
     fn take(&mut self, count: Option<usize>) -> Result<&'a [u8], String> {
-        let taken = count.and_then(|count| self.rest().get(..count)).ok_or_else(cut)?;
+        let taken = count.and_then(|count| self.rest().get(..count)).ok_or_else(truncated)?;
         self.at += taken.len();
         Ok(taken)
     }
@@ -395,13 +395,13 @@ impl<'a> Reader<'a> {
     /// The next word.
     fn word(&mut self) -> Result<&'a [u8], String> {
         let rest = self.rest();
-        let start = rest.iter().position(|byte| !byte.is_ascii_whitespace()).ok_or_else(cut)?;
+        let start = rest.iter().position(|byte| !byte.is_ascii_whitespace()).ok_or_else(truncated)?;
         let length = rest[start..].iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len() - start);
         self.at += start + length;
         Ok(&rest[start..start + length])
     }
 }
 
-fn cut() -> String {
+fn truncated() -> String {
     "the .vtk file ends before its numbers do".into()
 }

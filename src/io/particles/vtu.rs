@@ -102,9 +102,9 @@ fn child<'a, 'i>(node: Node<'a, 'i>, name: &'static str) -> Option<Node<'a, 'i>>
     children(node, name).next()
 }
 
-/// A number in an attribute, or `otherwise` if the attribute is missing.
-fn number<T: FromStr>(node: Node<'_, '_>, name: &str, otherwise: Option<T>) -> Result<T, String> {
-    match (node.attribute(name), otherwise) {
+/// A number in an attribute, or `default` if the attribute is missing.
+fn number<T: FromStr>(node: Node<'_, '_>, name: &str, default: Option<T>) -> Result<T, String> {
+    match (node.attribute(name), default) {
         (Some(text), _) => text.trim().parse().map_err(|_| format!("the .vtu file has {name}=\"{text}\"")),
         (None, Some(value)) => Ok(value),
         (None, None) => Err(format!("the .vtu file lacks a {name}")),
@@ -137,8 +137,8 @@ impl Piece {
             None => return Err("the .vtu file has a piece without Points".into()),
         };
         let positions = match positions {
-            Some(Array { kind, components: 3, numbers, .. }) if kind.is_real() => numbers,
-            None if count == 0 => Kind::F64.none(),
+            Some(Array { kind, components: 3, numbers, .. }) if kind.is_float() => numbers,
+            None if count == 0 => Kind::F64.empty(),
             _ => return Err("the Points of the .vtu file are not three floats each".into()),
         };
         let (mut arrays, mut left_out) = (Vec::new(), Vec::new());

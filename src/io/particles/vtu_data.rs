@@ -7,7 +7,7 @@ use base64::engine::general_purpose::STANDARD;
 use flate2::read::ZlibDecoder;
 
 use crate::error::fail_if;
-use crate::io::files::numbers::{Kind, Numbers, Order, most_inflated};
+use crate::io::files::numbers::{Kind, Numbers, Order, max_inflated};
 use crate::io::files::source;
 
 /// Words between two checks of the stop flag.
@@ -54,9 +54,9 @@ impl<'a> File<'a> {
         count: usize,
         words: impl Iterator<Item = &'w str>,
     ) -> Result<Numbers, String> {
-        let mut out = kind.none();
+        let mut out = kind.empty();
         for (n, word) in words.enumerate() {
-            source::go_on(n, PIECE)?;
+            source::check_every(n, PIECE)?;
             kind.read_word(word.as_bytes(), &mut out)?;
         }
         if out.count() == count { Ok(out) } else { Err(other_size(out.count(), "numbers", count)) }
@@ -71,9 +71,9 @@ impl<'a> File<'a> {
 
     /// Reads an array of `count` numbers that is preceded by its length.
     pub fn array(&self, kind: Kind, count: usize, mut stream: Stream<'_>) -> Result<Numbers, String> {
-        let size = count.checked_mul(kind.size()).filter(|&size| size as u64 <= most_inflated(self.length));
+        let size = count.checked_mul(kind.size()).filter(|&size| size as u64 <= max_inflated(self.length));
         let size = size.ok_or_else(|| format!("is too large for the file: it says {count} numbers"))?;
-        let mut out = kind.none();
+        let mut out = kind.empty();
         if size == 0 {
             // Some writers give empty arrays no length.
             return Ok(out);
@@ -81,8 +81,8 @@ impl<'a> File<'a> {
         let Codec { order, inflate, .. } = self.codec;
         match inflate {
             None => {
-                let said = self.head(&mut stream)?;
-                fail_if(said != size, || other_size(said, "bytes", size))?;
+                let stated = self.head(&mut stream)?;
+                fail_if(stated != size, || other_size(stated, "bytes", size))?;
                 kind.decode(&stream.take(size)?, order, &mut out)?;
             }
             Some(inflate) => kind.decode(&self.inflated(inflate, size, &mut stream)?, order, &mut out)?,
@@ -95,18 +95,18 @@ impl<'a> File<'a> {
         let [blocks, whole, last] = [self.head(stream)?, self.head(stream)?, self.head(stream)?];
         // The last block is shorter, unless its size is given as zero.
         let of_block = |block: usize| if block + 1 == blocks && last > 0 { last } else { whole };
-        let said = blocks
+        let stated = blocks
             .checked_sub(1)
             .map_or(Some(0), |before| before.checked_mul(whole)?.checked_add(of_block(before)));
-        fail_if(said != Some(size), || other_size(said.unwrap_or(usize::MAX), "bytes", size))?;
-        fail_if(blocks > stream.room(), cut)?;
+        fail_if(stated != Some(size), || other_size(stated.unwrap_or(usize::MAX), "bytes", size))?;
+        fail_if(blocks > stream.max_bytes(), truncated)?;
         let packed = (0..blocks).map(|_| self.head(stream)).collect::<Result<Vec<_>, _>>()?;
         let mut out = Vec::new();
         for (block, packed) in packed.into_iter().enumerate() {
-            source::go_on(0, 1)?;
+            source::check_every(0, 1)?;
             let (packed, size) = (stream.take(packed)?, of_block(block));
             // A size that the bytes cannot decompress to must not cause an allocation.
-            let inflated = Some(size).filter(|&size| size as u64 <= most_inflated(packed.len()));
+            let inflated = Some(size).filter(|&size| size as u64 <= max_inflated(packed.len()));
             let inflated = inflated.and_then(|size| inflate(&packed, size));
             out.extend(inflated.ok_or_else(|| format!("is damaged in its compressed block {}", block + 1))?);
         }
@@ -115,21 +115,21 @@ impl<'a> File<'a> {
 
     /// A length.
     fn head(&self, stream: &mut Stream<'_>) -> Result<usize, String> {
-        let mut out = self.codec.head.none();
+        let mut out = self.codec.head.empty();
         self.codec.head.decode(&stream.take(self.codec.head.size())?, self.codec.order, &mut out)?;
         match out {
-            Numbers::Whole(numbers) => usize::try_from(numbers[0]).map_err(|error| error.to_string()),
-            Numbers::Real(_) => unreachable!("lengths are integers"),
+            Numbers::Integers(numbers) => usize::try_from(numbers[0]).map_err(|error| error.to_string()),
+            Numbers::Floats(_) => unreachable!("lengths are integers"),
         }
     }
 }
 
-fn cut() -> String {
+fn truncated() -> String {
     "ends before its numbers do".into()
 }
 
-fn other_size(said: usize, what: &str, size: usize) -> String {
-    format!("has {said} {what}, not {size}")
+fn other_size(stated: usize, what: &str, size: usize) -> String {
+    format!("has {stated} {what}, not {size}")
 }
 
 /// Bytes that are taken in order.
@@ -151,23 +151,23 @@ impl<'a> Stream<'a> {
     }
 
     /// Upper bound on the bytes that can be taken.
-    fn room(&self) -> usize {
+    fn max_bytes(&self) -> usize {
         self.rest.len() + self.ready.as_ref().map_or(0, Vec::len)
     }
 
     /// The next bytes.
     fn take(&mut self, count: usize) -> Result<Vec<u8>, String> {
         let Some(ready) = &mut self.ready else {
-            let (taken, rest) = self.rest.split_at_checked(count).ok_or_else(cut)?;
+            let (taken, rest) = self.rest.split_at_checked(count).ok_or_else(truncated)?;
             self.rest = rest;
             return Ok(taken.to_vec());
         };
         while ready.len() < count {
             // Three bytes are four characters.
-            let letters = (count - ready.len()).div_ceil(3).checked_mul(4);
-            let text = letters.and_then(|letters| self.rest.get(..letters)).ok_or_else(cut)?;
+            let characters = (count - ready.len()).div_ceil(3).checked_mul(4);
+            let text = characters.and_then(|characters| self.rest.get(..characters)).ok_or_else(truncated)?;
             // Lengths may be encoded as a piece of their own, which ends with its padding.
-            let padding = text.iter().position(|&letter| letter == b'=');
+            let padding = text.iter().position(|&character| character == b'=');
             let end = padding.map_or(text.len(), |at| (at / 4 + 1) * 4);
             let bytes = STANDARD.decode(&text[..end]).ok().filter(|bytes| !bytes.is_empty());
             ready.extend(bytes.ok_or("is damaged: it is not base64")?);

@@ -19,10 +19,10 @@ const PIECE: usize = 1 << 14;
 
 /// Reads the particles of a file.
 pub(in crate::io) fn parse(bytes: &[u8]) -> Result<ParticleColumns, String> {
-    let marked = text::without_mark(bytes);
-    let marked = if is_wide(bytes) { marked? } else { marked.unwrap_or(bytes) };
-    if is_text(marked) {
-        return parse_text(marked);
+    let unmarked = text::without_mark(bytes);
+    let unmarked = if is_utf_16(bytes) { unmarked? } else { unmarked.unwrap_or(bytes) };
+    if is_text(unmarked) {
+        return parse_text(unmarked);
     }
     if !bytes.len().is_multiple_of(ROW) {
         let length = bytes.len();
@@ -30,13 +30,13 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<ParticleColumns, String> {
             "is cut short, or no .xyz file: {length} bytes are not a multiple of {ROW}, and not text"
         ));
     }
-    let mut numbers = Kind::F32.none();
+    let mut numbers = Kind::F32.empty();
     Kind::F32.decode(bytes, Order::Little, &mut numbers)?;
     Ok(ParticleColumns::new(numbers))
 }
 
 /// Whether every other byte is 0, as in UTF-16, after what may be its mark or the first bytes of a float.
-fn is_wide(bytes: &[u8]) -> bool {
+fn is_utf_16(bytes: &[u8]) -> bool {
     let head = &bytes[..bytes.len().min(64)];
     [2, 3].into_iter().any(|from| head.len() > from && head[from..].iter().step_by(2).all(|&byte| byte == 0))
 }
@@ -56,7 +56,7 @@ fn parse_text(bytes: &[u8]) -> Result<ParticleColumns, String> {
     let mut commas = bytes.contains(&b',').then(Commas::default);
     let mut points = Vec::new();
     for (n, line) in text::lines(bytes) {
-        source::go_on(n, PIECE)?;
+        source::check_every(n, PIECE)?;
         let line = line.trim_ascii();
         if line.is_empty() || line.starts_with(b"#") {
             continue;
@@ -71,16 +71,17 @@ fn parse_text(bytes: &[u8]) -> Result<ParticleColumns, String> {
         };
         for _ in 0..3 {
             let word = words.next().ok_or_else(|| format!("line {n}: there are no three numbers"))?;
-            numbers.push(text::number(word).ok_or_else(|| format!("line {n}: {}", text::no_number(word)))?);
+            numbers
+                .push(text::number(word).ok_or_else(|| format!("line {n}: {}", text::not_a_number(word)))?);
         }
     }
-    Ok(ParticleColumns::new(Numbers::Real(numbers)))
+    Ok(ParticleColumns::new(Numbers::Floats(numbers)))
 }
 
 /// The columns of a line, separated by blanks and semicolons.
 fn columns(line: &[u8]) -> impl Iterator<Item = &[u8]> {
-    let is_between = |byte: &u8| byte.is_ascii_whitespace() || *byte == b';';
-    line.split(is_between).filter(|column| !column.is_empty())
+    let is_separator = |byte: &u8| byte.is_ascii_whitespace() || *byte == b';';
+    line.split(is_separator).filter(|column| !column.is_empty())
 }
 
 /// What the commas of a file have turned out to be: the first line of each kind.
@@ -127,16 +128,15 @@ impl Commas {
             }
             out.extend_from_slice(&first.join(&b' '));
         } else {
-            let between: Vec<&[u8]> =
-                words.iter().flat_map(|word| word.split(|&byte| byte == b',')).collect();
+            let split: Vec<&[u8]> = words.iter().flat_map(|word| word.split(|&byte| byte == b',')).collect();
             // Digits that begin with 0 come after a decimal comma.
-            let is_share =
+            let is_fraction =
                 |word: &&&[u8]| word.len() > 1 && word.iter().all(u8::is_ascii_digit) && word[0] == b'0';
-            if let Some(word) = between.iter().find(is_share) {
+            if let Some(word) = split.iter().find(is_fraction) {
                 return Err(unclear(word));
             }
             self.others.get_or_insert(n);
-            out.extend_from_slice(&between.join(&b' '));
+            out.extend_from_slice(&split.join(&b' '));
         }
         match (self.decimal, self.others) {
             (Some(commas), Some(points)) => Err(format!(

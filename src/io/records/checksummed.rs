@@ -17,14 +17,14 @@ const FORMAT: u64 = 1;
 /// # Errors
 /// What the operating system reports.
 pub fn write(path: &Path, content: &impl Serialize) -> Result<()> {
-    atomic::write_bytes(path, sealed(content)?.as_bytes())
+    atomic::write_bytes(path, to_text(content)?.as_bytes())
 }
 
 /// The text of a file that holds a value.
 ///
 /// # Errors
 /// A value that JSON cannot represent.
-pub fn sealed(content: &impl Serialize) -> Result<String> {
+pub fn to_text(content: &impl Serialize) -> Result<String> {
     let content = serde_json::to_value(content).map_err(|error| Error::Internal(error.to_string()))?;
     let check = hash::of_bytes(content.to_string().as_bytes());
     Ok(text_of(&json!({ "format": FORMAT, "check": check, "content": content })))
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_sealed_is_read_and_what_is_changed_is_refused() {
+    fn what_is_written_is_read_and_what_is_changed_is_refused() {
         let folder = std::env::temp_dir().join(format!("frazil-sealed-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         let path = folder.join("a.json");
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stamp_tells_every_change_of_a_letter() {
+    fn a_stamp_detects_every_changed_bit() {
         let text = stamp(&format!("{{\n  \"check\": \"{UNSTAMPED}\",\n  \"frame\": 1\n}}\n"));
         assert!(is_stamped(text.as_bytes()) && !text.contains(UNSTAMPED));
         for at in 0..text.len() {

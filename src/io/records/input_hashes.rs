@@ -18,7 +18,7 @@ impl InputHashes {
     /// What the operating system reports; other bytes than when this file was read before.
     pub fn read(&self, path: &Path) -> Result<Vec<u8>> {
         let bytes = crate::io::files::source::read(path)?;
-        self.note(path, hash::of_bytes(&bytes))?;
+        self.record(path, hash::of_bytes(&bytes))?;
         Ok(bytes)
     }
 
@@ -26,8 +26,8 @@ impl InputHashes {
     ///
     /// # Errors
     /// Another hash than when this file was read before.
-    pub fn note(&self, path: &Path, hash: String) -> Result<()> {
-        let mut known = self.0.lock().expect("no panic holds this lock");
+    pub fn record(&self, path: &Path, hash: String) -> Result<()> {
+        let mut known = self.0.lock().expect("no panic while it is locked");
         match known.get(path) {
             Some(before) if *before != hash => {
                 Err(Error::file(path, "was changed while it was in use: run again when it stays as it is"))
@@ -43,11 +43,11 @@ impl InputHashes {
     /// Runs a reader that opens the file itself: its content must be the same before and after.
     ///
     /// # Errors
-    /// As [`InputHashes::note`]; errors of the reader.
-    pub fn around<T>(&self, path: &Path, read: impl FnOnce() -> Result<T>) -> Result<T> {
+    /// As [`InputHashes::record`]; errors of the reader.
+    pub fn read_with<T>(&self, path: &Path, read: impl FnOnce() -> Result<T>) -> Result<T> {
         self.hash(path)?;
         let read = read()?;
-        self.note(path, hash::of_file(path)?)?;
+        self.record(path, hash::of_file(path)?)?;
         Ok(read)
     }
 
@@ -56,11 +56,11 @@ impl InputHashes {
     /// # Errors
     /// What the operating system reports.
     pub fn hash(&self, path: &Path) -> Result<String> {
-        if let Some(hash) = self.0.lock().expect("no panic holds this lock").get(path) {
+        if let Some(hash) = self.0.lock().expect("no panic while it is locked").get(path) {
             return Ok(hash.clone());
         }
         let hash = hash::of_file(path)?;
-        self.note(path, hash.clone())?;
+        self.record(path, hash.clone())?;
         Ok(hash)
     }
 }
@@ -70,17 +70,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_that_changes_between_two_looks_is_named() {
+    fn a_file_that_changes_between_two_reads_is_named() {
         let folder = std::env::temp_dir().join(format!("frazil-seen-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         let path = folder.join("a.obj");
-        let seen = InputHashes::default();
+        let hashes = InputHashes::default();
         std::fs::write(&path, "one").unwrap();
-        let hash = seen.hash(&path).unwrap();
-        assert_eq!(seen.read(&path).unwrap(), b"one");
+        let hash = hashes.hash(&path).unwrap();
+        assert_eq!(hashes.read(&path).unwrap(), b"one");
         std::fs::write(&path, "two").unwrap();
-        assert_eq!(seen.hash(&path).unwrap(), hash, "what was used counts");
-        let error = seen.read(&path).unwrap_err().to_string();
+        assert_eq!(hashes.hash(&path).unwrap(), hash, "what was used counts");
+        let error = hashes.read(&path).unwrap_err().to_string();
         assert!(error.contains("a.obj") && error.contains("changed"), "{error}");
         std::fs::remove_dir_all(&folder).unwrap();
     }

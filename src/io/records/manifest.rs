@@ -32,19 +32,19 @@ pub enum Keeps {
 }
 
 /// Whether a file belongs to a shot and has the contents that its frame's record states; reads it.
-pub fn knows(path: &Path) -> bool {
+pub fn is_recorded(path: &Path) -> bool {
     let of_record = || {
         let path = std::path::absolute(path).ok()?;
         let (kind, folder) = (path.parent()?.file_name()?.to_str()?, path.parent()?.parent()?);
         let name = path.file_name()?.to_str()?;
         let frame = name.split('.').rev().find_map(|part| part.parse::<i32>().ok())?;
         let relative = format!("{kind}/{name}");
-        let names_it = |stage: &String| {
+        let has_it = |stage: &String| {
             let manifest = Manifest::read(folder, stage, frame).ok().flatten();
             let files = manifest.map(|manifest| manifest.files).unwrap_or_default();
             files.iter().any(|file| file.path == relative && file.is_whole(folder))
         };
-        Some(stages(folder, frame)?.iter().any(names_it))
+        Some(stages(folder, frame)?.iter().any(has_it))
     };
     of_record().unwrap_or(false)
 }

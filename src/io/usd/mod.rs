@@ -307,17 +307,17 @@ const ATTRIBUTES: [(&str, &str); 5] = [
 const VELOCITIES: &str = "velocities";
 
 /// Texture coordinates: the values and, if there are seams, an index for each corner.
-const POSITIONS: &str = "texCoord2f[] primvars:st";
-const POSITION_INDICES: &str = "int[] primvars:st:indices";
+const TEXCOORDS: &str = "texCoord2f[] primvars:st";
+const TEXCOORD_INDICES: &str = "int[] primvars:st:indices";
 
 /// Declares the interpolation of texture coordinates whose values are elsewhere: per vertex, or per corner of faces.
 fn declare_uvs(out: &mut String, indent: &str, uvs: Option<&Uvs>) {
     let Some(uvs) = uvs else { return };
     let interpolation = if uvs.corners.is_some() { "faceVarying" } else { "vertex" };
     let _ =
-        write!(out, "{indent}{POSITIONS} (\n{indent}    interpolation = \"{interpolation}\"\n{indent})\n");
+        write!(out, "{indent}{TEXCOORDS} (\n{indent}    interpolation = \"{interpolation}\"\n{indent})\n");
     if uvs.corners.is_some() {
-        let _ = writeln!(out, "{indent}{POSITION_INDICES}");
+        let _ = writeln!(out, "{indent}{TEXCOORD_INDICES}");
     }
 }
 
@@ -374,21 +374,21 @@ pub fn clip(kind: &str, frame: i32, fps: f64, units: Units, meshes: &[MeshFrame]
             list(mesh.velocities.iter(), row),
         ];
         let moves = mesh.velocities.len() == mesh.points.len();
-        let there = ATTRIBUTES.iter().zip(values);
-        for ((class, attribute), value) in there.filter(|((_, name), _)| moves || *name != VELOCITIES) {
+        let written = ATTRIBUTES.iter().zip(values);
+        for ((class, attribute), value) in written.filter(|((_, name), _)| moves || *name != VELOCITIES) {
             let _ = writeln!(out, "        {class} {attribute}.timeSamples = {{ {frame}: {value} }}");
         }
         declare_uvs(&mut out, "        ", mesh.uvs);
         if let Some(uvs) = mesh.uvs {
-            let positions = list(uvs.coordinates.iter(), |out, [u, v]| {
+            let coordinates = list(uvs.coordinates.iter(), |out, [u, v]| {
                 let _ = write!(out, "({u}, {v})");
             });
-            let _ = writeln!(out, "        {POSITIONS}.timeSamples = {{ {frame}: {positions} }}");
+            let _ = writeln!(out, "        {TEXCOORDS}.timeSamples = {{ {frame}: {coordinates} }}");
             if let Some(corners) = &uvs.corners {
                 let indices = list(corners.iter(), |out, index| {
                     let _ = write!(out, "{index}");
                 });
-                let _ = writeln!(out, "        {POSITION_INDICES}.timeSamples = {{ {frame}: {indices} }}");
+                let _ = writeln!(out, "        {TEXCOORD_INDICES}.timeSamples = {{ {frame}: {indices} }}");
             }
         }
         primvars::write(&mut out, "        ", frame, mesh.arrays);

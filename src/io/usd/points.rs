@@ -40,8 +40,8 @@ pub fn frame(name: &str, frame: i32, fps: f64, points: &Points) -> String {
             (name, Values::Vector(column)) if Some(name) == velocities => {
                 list(each.map(|point| column.get(point)), vector)
             }
-            ("id", Values::Long(column)) => list(each.map(|point| column.get(point)), whole),
-            ("id", Values::Int(column)) => list(each.map(|point| column.get(point)), whole),
+            ("id", Values::Long(column)) => list(each.map(|point| column.get(point)), integer),
+            ("id", Values::Int(column)) => list(each.map(|point| column.get(point)), integer),
             ("pscale", Values::Float(column)) => {
                 list(column.stored().iter(), |out, radius| number(out, 2.0 * radius))
             }
@@ -79,10 +79,10 @@ pub const VELOCITIES: [&str; 4] = ["v", "velocity", "velocities", "vel"];
 /// The name of the attribute that holds the velocities.
 fn velocities(points: &Points) -> Option<&str> {
     let named = |name: &&str| {
-        let is_it = |attribute: &&Attribute| {
+        let is_match = |attribute: &&Attribute| {
             matches!(attribute.values, Values::Vector(_)) && attribute.name.to_lowercase() == **name
         };
-        points.attributes.iter().find(is_it)
+        points.attributes.iter().find(is_match)
     };
     VELOCITIES.iter().find_map(named).map(|attribute| &attribute.name[..])
 }
@@ -115,9 +115,9 @@ fn declaration(
 fn primvar(values: &Values) -> String {
     match values {
         Values::Float(column) => list(column.stored().iter(), |out, value| number(out, *value)),
-        Values::Int(column) => list(column.stored().iter(), whole),
-        Values::Long(column) => list(column.stored().iter(), whole),
-        Values::Bool(column) => list(column.stored().iter(), |out, yes| whole(out, u8::from(*yes))),
+        Values::Int(column) => list(column.stored().iter(), integer),
+        Values::Long(column) => list(column.stored().iter(), integer),
+        Values::Bool(column) => list(column.stored().iter(), |out, yes| integer(out, u8::from(*yes))),
         Values::Vector(column) => list(column.stored().iter(), |out, v| vector(out, *v)),
     }
 }
@@ -131,7 +131,7 @@ fn extent(points: &Points, pscale: Option<&Column<f32>>) -> [[f32; 3]; 2] {
     [low.cast::<f32>().into(), high.cast::<f32>().into()]
 }
 
-fn whole(out: &mut String, number: impl std::fmt::Display) {
+fn integer(out: &mut String, number: impl std::fmt::Display) {
     let _ = write!(out, "{number}");
 }
 

@@ -32,10 +32,10 @@ pub(in crate::io) fn declare(out: &mut String, indent: &str, primvars: &[Primvar
 
 /// Writes the primvars of one frame; arrays of corners have three values for each triangle.
 pub(in crate::io) fn write(out: &mut String, indent: &str, frame: i32, arrays: &[&MeshArray]) {
-    for Group { primvar, parts, is_share } in grouped(arrays) {
+    for Group { primvar, parts, is_fraction } in grouped(arrays) {
         declare(out, indent, std::slice::from_ref(&primvar));
         let number = |out: &mut String, array: &MeshArray, at: usize| {
-            if is_share { share(out, array, at) } else { number(out, array.number, array.values[at]) }
+            if is_fraction { fraction(out, array, at) } else { number(out, array.number, array.values[at]) }
         };
         let count = parts.iter().map(|part| part.values.len()).min().unwrap_or(0);
         let values = list(0..count, |out, at| match parts[..] {
@@ -58,8 +58,8 @@ pub(in crate::io) fn write(out: &mut String, indent: &str, frame: i32, arrays: &
 struct Group<'a> {
     primvar: Primvar,
     parts: Vec<&'a MeshArray>,
-    /// Whether its values are shares of 1, which files may store as bytes.
-    is_share: bool,
+    /// Whether its values are fractions of 1, which files may store as bytes.
+    is_fraction: bool,
 }
 
 /// The primvar planned for some arrays.
@@ -69,7 +69,7 @@ struct Draft {
     class: &'static str,
     /// Indices of the arrays.
     members: Vec<usize>,
-    is_share: bool,
+    is_fraction: bool,
 }
 
 /// The vector that three arrays form.
@@ -94,27 +94,27 @@ fn grouped<'a>(arrays: &[&'a MeshArray]) -> Vec<Group<'a>> {
         if written[at] {
             continue;
         }
-        let draft = vector_at(arrays, &written, at).unwrap_or_else(|| alone(array, at));
+        let draft = vector_at(arrays, &written, at).unwrap_or_else(|| single(array, at));
         draft.members.iter().for_each(|member| written[*member] = true);
         let declared = format!("{}[] primvars:{}", draft.class, unique(draft.name, &mut taken));
         let primvar = Primvar { declared, interpolation: interpolation(array.on) };
         let parts = draft.members.iter().map(|member| arrays[*member]).collect();
-        out.push(Group { primvar, parts, is_share: draft.is_share });
+        out.push(Group { primvar, parts, is_fraction: draft.is_fraction });
     }
     out
 }
 
 /// An array that is not part of a vector or colour.
-fn alone(array: &MeshArray, at: usize) -> Draft {
+fn single(array: &MeshArray, at: usize) -> Draft {
     let members = vec![at];
-    if array.name == "alpha" && holds_shares(array.number) {
-        return Draft { name: OPACITY.into(), class: "float", members, is_share: true };
+    if array.name == "alpha" && can_be_colours(array.number) {
+        return Draft { name: OPACITY.into(), class: "float", members, is_fraction: true };
     }
     let mut name = prim_name(&array.name);
     if TAKEN.contains(&name.as_str()) {
         name.push('_');
     }
-    Draft { name, class: scalar(array.number), members, is_share: false }
+    Draft { name, class: scalar(array.number), members, is_fraction: false }
 }
 
 /// The vector or colour that an array is a component of, if all its components exist and are of one kind.
@@ -122,19 +122,19 @@ fn vector_at(arrays: &[&MeshArray], written: &[bool], at: usize) -> Option<Draft
     let array = arrays[at];
     let Vector { parts, name, is_colour } = vector_of(&array.name)?;
     let class = match is_colour {
-        true => holds_shares(array.number).then_some("color3f"),
+        true => can_be_colours(array.number).then_some("color3f"),
         false => triple(array.number),
     }?;
     let members: Option<Vec<usize>> = parts
         .iter()
         .map(|part| {
-            let is_it = |other: &&MeshArray| {
+            let is_match = |other: &&MeshArray| {
                 other.name == *part && (other.on, other.number) == (array.on, array.number)
             };
-            arrays.iter().position(is_it).filter(|found| !written[*found])
+            arrays.iter().position(is_match).filter(|found| !written[*found])
         })
         .collect();
-    Some(Draft { name, class, members: members?, is_share: is_colour })
+    Some(Draft { name, class, members: members?, is_fraction: is_colour })
 }
 
 /// The vector or colour that an array of this name may be a component of.
@@ -173,7 +173,7 @@ fn interpolation(on: On) -> &'static str {
 }
 
 /// Whether numbers of this type can be colours.
-fn holds_shares(number: Number) -> bool {
+fn can_be_colours(number: Number) -> bool {
     number.is_float() || number == Number::U8
 }
 
@@ -198,15 +198,15 @@ fn triple(number: Number) -> Option<&'static str> {
 }
 
 /// Floats from this value on are written with an exponent.
-const LONG: f64 = 1e16;
+const EXPONENT_FROM: f64 = 1e16;
 
 /// Writes a number in USD's syntax.
 pub(in crate::io) fn number(out: &mut String, number: Number, value: f64) {
     let _ = match number {
         // USD accepts it only in lower case, and takes long numbers without an exponent for integers.
         _ if value.is_nan() => write!(out, "nan"),
-        Number::F32 if value.abs() >= LONG => write!(out, "{:e}", value as f32),
-        Number::F64 if value.abs() >= LONG => write!(out, "{value:e}"),
+        Number::F32 if value.abs() >= EXPONENT_FROM => write!(out, "{:e}", value as f32),
+        Number::F64 if value.abs() >= EXPONENT_FROM => write!(out, "{value:e}"),
         Number::F32 => write!(out, "{}", value as f32),
         Number::F64 => write!(out, "{value}"),
         Number::I8 | Number::U8 | Number::I16 | Number::U16 | Number::I32 | Number::U32 => {
@@ -215,8 +215,8 @@ pub(in crate::io) fn number(out: &mut String, number: Number, value: f64) {
     };
 }
 
-/// A value as a share of 1.
-fn share(out: &mut String, array: &MeshArray, at: usize) {
+/// Writes a value as a fraction of 1.
+fn fraction(out: &mut String, array: &MeshArray, at: usize) {
     let whole = if array.number == Number::U8 { 255.0 } else { 1.0 };
     number(out, Number::F32, f64::from(array.values[at] as f32 / whole));
 }

@@ -1,4 +1,4 @@
-//! How USD's text is written: lists, names.
+//! USD syntax: lists, names.
 
 pub(in crate::io) fn list<T>(
     items: impl ExactSizeIterator<Item = T>,

@@ -10,7 +10,7 @@ use crate::geometry::{DVec3, TriMesh};
 use crate::mesh_repair::Source;
 
 /// A triangle is torn if its corners were farther apart at the first frame than this many times its longest edge plus a spacing: liquid that
-/// was drawn together by less shows a texture that is drawn together.
+/// was drawn together by less has a compressed texture.
 pub(in crate::mesh_repair::attributes) const TORN: f64 = 3.0;
 
 /// A new triangle that takes the values of the first frame.
@@ -32,7 +32,7 @@ pub(in crate::mesh_repair) struct Charts<'a> {
     /// Ascending.
     pub list: Vec<Chart>,
     /// Their vertices in the new mesh, ascending.
-    pub names: Vec<u32>,
+    pub vertices: Vec<u32>,
     /// For each of these, the position of the first mesh nearest to where the liquid there was.
     pub spots: Vec<Spot>,
 }
@@ -49,7 +49,7 @@ impl<'a> Charts<'a> {
             true => Vec::new(),
             false => sources.iter().enumerate().filter_map(known).collect(),
         };
-        let mut out = Self { first, list: Vec::new(), names: Vec::new(), spots: Vec::new() };
+        let mut out = Self { first, list: Vec::new(), vertices: Vec::new(), spots: Vec::new() };
         if known.is_empty() {
             return out;
         }
@@ -65,16 +65,16 @@ impl<'a> Charts<'a> {
             let triangle = tree.nearest(position).map_or(0, |nearest| nearest.triangle);
             Spot { triangle, weights: weights(&first.mesh.corners(triangle), position) }
         };
-        out.names = known.iter().flat_map(|(number, _)| mesh.triangles[*number]).collect();
-        out.names.sort_unstable();
-        out.names.dedup();
-        let of_name = |name: &u32| spot(position(*name).unwrap_or_default());
-        out.spots = out.names.par_iter().with_min_len(GRAIN).map(of_name).collect();
+        out.vertices = known.iter().flat_map(|(number, _)| mesh.triangles[*number]).collect();
+        out.vertices.sort_unstable();
+        out.vertices.dedup();
+        let of_vertex = |vertex: &u32| spot(position(*vertex).unwrap_or_default());
+        out.spots = out.vertices.par_iter().with_min_len(GRAIN).map(of_vertex).collect();
         let chart = |(number, positions): &(usize, [DVec3; 3])| {
-            let slots = mesh.triangles[*number].map(|name| out.slot(name));
-            let most = TORN * longest(&mesh.corners(*number)) + traced.spacing;
-            let there = slots.map(|slot| out.position(&out.spots[slot]));
-            let is_torn = longest(positions) > most || longest(&there) > most;
+            let slots = mesh.triangles[*number].map(|vertex| out.slot(vertex));
+            let max_distance = TORN * longest(&mesh.corners(*number)) + traced.spacing;
+            let on_first = slots.map(|slot| out.position(&out.spots[slot]));
+            let is_torn = longest(positions) > max_distance || longest(&on_first) > max_distance;
             let middle = (positions[0] + positions[1] + positions[2]) / 3.0;
             let triangle = spot(if is_torn { nearest_to(middle, positions) } else { middle }).triangle;
             let corners = first.mesh.corners(triangle);
@@ -86,8 +86,8 @@ impl<'a> Charts<'a> {
     }
 
     /// Index of a vertex among the charts' vertices.
-    pub fn slot(&self, name: u32) -> usize {
-        self.names.partition_point(|other| *other < name)
+    pub fn slot(&self, vertex: u32) -> usize {
+        self.vertices.partition_point(|other| *other < vertex)
     }
 
     /// Where on the first mesh a spot is (m).
@@ -104,10 +104,10 @@ impl<'a> Charts<'a> {
     /// For each of the charts' vertices, whether it was there before, or is also used by another triangle.
     pub fn kept(&self, vertices: &[Option<u32>], triangles: &[[u32; 3]]) -> Vec<bool> {
         let mut is_kept: Vec<bool> = vertices.iter().map(Option::is_some).collect();
-        for names in self.others(triangles).map(|number| &triangles[number]) {
-            names.iter().for_each(|name| is_kept[*name as usize] = true);
+        for corners in self.others(triangles).map(|number| &triangles[number]) {
+            corners.iter().for_each(|corner| is_kept[*corner as usize] = true);
         }
-        self.names.iter().map(|name| is_kept[*name as usize]).collect()
+        self.vertices.iter().map(|vertex| is_kept[*vertex as usize]).collect()
     }
 
     /// Triangles without a chart, ascending.
@@ -126,9 +126,10 @@ impl<'a> Charts<'a> {
         let (values, triangles) = (&mut array.values, &self.first.mesh.triangles);
         match own.on {
             On::Vertices => {
-                let made = self.names.iter().zip(&self.spots).zip(is_kept).filter(|(_, is_kept)| !**is_kept);
-                for ((name, spot), _) in made {
-                    values[*name as usize] = blended(own, triangles, spot.triangle, &spot.weights);
+                let made =
+                    self.vertices.iter().zip(&self.spots).zip(is_kept).filter(|(_, is_kept)| !**is_kept);
+                for ((vertex, spot), _) in made {
+                    values[*vertex as usize] = blended(own, triangles, spot.triangle, &spot.weights);
                 }
             }
             On::Corners => {

@@ -17,9 +17,9 @@ use crate::geometry::mesh::attributes::{DetailedMesh, MeshArray, On};
 use crate::geometry::{DVec3, TriMesh, Uvs, Vec3};
 use charts::Traced;
 use traced::is_mask;
-use weights::{Weights, alone, between, blended, heaviest, weights};
+use weights::{Weights, at_corner, blended, heaviest, interpolated, weights};
 
-/// Vertices or triangles of a task.
+/// Vertices or triangles per task.
 pub(super) const GRAIN: usize = 1024;
 
 /// Carries the arrays and texture coordinates of `detail` over to the changed mesh `mesh`; `vertices` gives the old vertex of each vertex,
@@ -43,17 +43,17 @@ pub fn carried(
 ) -> DetailedMesh {
     let mut out = match &detail.arrays[..] {
         [mask] if traced.is_some() && detail.uvs.is_none() && is_mask(mask) => of_mask(mask, mesh, sources),
-        _ => of_old(detail, mesh, vertices, sources, traced.is_some()),
+        _ => from_old_mesh(detail, mesh, vertices, sources, traced.is_some()),
     };
     if let Some(traced) = traced {
-        traced.put(&mut out, vertices, sources);
+        traced.apply(&mut out, vertices, sources);
     }
     out
 }
 
 /// The values that come from the previous mesh alone. In a tracked mesh no vertices were joined, but remaining vertices may have absorbed
 /// others.
-fn of_old(
+fn from_old_mesh(
     detail: &DetailedMesh,
     mesh: TriMesh,
     vertices: &[Option<u32>],
@@ -64,7 +64,7 @@ fn of_old(
         return DetailedMesh { mesh, ..DetailedMesh::default() };
     }
     if detail.mesh.triangles.is_empty() {
-        return of_nothing(detail, mesh);
+        return zeros(detail, mesh);
     }
     let origins = Origins::of(&detail.mesh, &mesh, vertices, sources);
     let uvs = detail.uvs.as_ref().map(|uvs| origins.uvs(uvs, &mesh.triangles, sources, is_tracked));
@@ -72,7 +72,7 @@ fn of_old(
     DetailedMesh { mesh, uvs, arrays }
 }
 
-/// The same for a mesh that carries only the mask of rebuilt faces: no positions are needed.
+/// As [`from_old_mesh`], for a mesh that carries only the mask of rebuilt faces: no positions are needed.
 fn of_mask(mask: &MeshArray, mesh: TriMesh, sources: &[Source]) -> DetailedMesh {
     let value = |source: &Source| match *source {
         Source::Whole(triangle) | Source::Part(triangle) => mask.values[triangle as usize],
@@ -83,10 +83,10 @@ fn of_mask(mask: &MeshArray, mesh: TriMesh, sources: &[Source]) -> DetailedMesh 
 }
 
 /// Attributes of a mesh that has no old mesh to take them from: zeros.
-fn of_nothing(detail: &DetailedMesh, mesh: TriMesh) -> DetailedMesh {
+fn zeros(detail: &DetailedMesh, mesh: TriMesh) -> DetailedMesh {
     let [vertices, faces] = [mesh.positions.len(), mesh.triangles.len()];
     let array = |array: &MeshArray| array.with(vec![0.0; array.on.count(vertices, faces)]);
-    let uvs = |uvs: &Uvs| Uvs::nothing(uvs.corners.is_some(), vertices, faces);
+    let uvs = |uvs: &Uvs| Uvs::zeros(uvs.corners.is_some(), vertices, faces);
     let (arrays, uvs) = (detail.arrays.iter().map(array).collect(), detail.uvs.as_ref().map(uvs));
     DetailedMesh { mesh, uvs, arrays }
 }
@@ -96,7 +96,7 @@ enum Origin {
     /// A vertex of the old mesh.
     Vertex(u32),
     /// A position on a triangle of the old mesh.
-    Place(usize, Weights),
+    Position(usize, Weights),
 }
 
 /// Where all values come from.
@@ -113,13 +113,13 @@ impl<'a> Origins<'a> {
     /// For a mesh that was made from another one, which has triangles.
     fn of(old: &'a TriMesh, new: &TriMesh, vertices: &[Option<u32>], sources: &[Source]) -> Self {
         let tree = NearestTree::new(old);
-        let nearest = |place: DVec3| tree.nearest(place).map_or(0, |nearest| nearest.triangle);
+        let nearest = |position: DVec3| tree.nearest(position).map_or(0, |nearest| nearest.triangle);
         let vertex = |(own, position): (&Option<u32>, &Vec3)| match own {
             Some(vertex) => Origin::Vertex(*vertex),
             None => {
-                let place: DVec3 = position.cast();
-                let triangle = nearest(place);
-                Origin::Place(triangle, weights(&old.corners(triangle), place))
+                let position = position.cast();
+                let triangle = nearest(position);
+                Origin::Position(triangle, weights(&old.corners(triangle), position))
             }
         };
         let triangle = |(number, source): (usize, &Source)| {
@@ -133,7 +133,7 @@ impl<'a> Origins<'a> {
             let corner = |vertex: u32| {
                 let is_own = |corner: &u32| vertices[vertex as usize] == Some(*corner);
                 match old.triangles[chart].iter().position(is_own) {
-                    Some(corner) => alone(corner),
+                    Some(corner) => at_corner(corner),
                     None => weights(&old.corners(chart), new.positions[vertex as usize].cast()),
                 }
             };
@@ -149,7 +149,7 @@ impl<'a> Origins<'a> {
     fn array(&self, array: &MeshArray) -> MeshArray {
         let of_vertex = |origin: &Origin| match origin {
             Origin::Vertex(vertex) => array.values[*vertex as usize],
-            Origin::Place(triangle, weights) => blended(array, self.old, *triangle, weights),
+            Origin::Position(triangle, weights) => blended(array, self.old, *triangle, weights),
         };
         let of_corners = |(chart, weights): &(usize, [Weights; 3])| {
             weights.map(|weights| blended(array, self.old, *chart, &weights))
@@ -165,40 +165,40 @@ impl<'a> Origins<'a> {
     /// Texture coordinates for these triangles of the new mesh, with their sources.
     fn uvs(&self, uvs: &Uvs, triangles: &[[u32; 3]], sources: &[Source], is_tracked: bool) -> Uvs {
         if uvs.corners.is_none() && (is_tracked || !self.joins_seams(uvs, triangles)) {
-            let position = |origin: &Origin| match origin {
+            let coordinate = |origin: &Origin| match origin {
                 Origin::Vertex(vertex) => uvs.coordinates[*vertex as usize],
-                Origin::Place(triangle, weights) => {
-                    between(self.old[*triangle].map(|vertex| uvs.coordinates[vertex as usize]), weights)
+                Origin::Position(triangle, weights) => {
+                    interpolated(self.old[*triangle].map(|vertex| uvs.coordinates[vertex as usize]), weights)
                 }
             };
-            let positions = self.vertices.iter().map(position).collect();
-            return Uvs { coordinates: positions, corners: None, missing: uvs.missing };
+            let coordinates = self.vertices.iter().map(coordinate).collect();
+            return Uvs { coordinates, corners: None, missing: uvs.missing };
         }
-        let mut positions = uvs.coordinates.clone();
+        let mut coordinates = uvs.coordinates.clone();
         let mut corners = Vec::with_capacity(3 * self.triangles.len());
-        let mut beside = self.beside(uvs, triangles, sources).into_iter().peekable();
+        let mut off_chart = self.off_chart(uvs, triangles, sources).into_iter().peekable();
         for (chart, weights) in &self.triangles {
             let own = uvs.indices(self.old, *chart);
             for weights in weights {
-                let most = heaviest(weights);
-                if let Some((_, index)) = beside.next_if(|(corner, _)| *corner == corners.len()) {
+                let nearest = heaviest(weights);
+                if let Some((_, index)) = off_chart.next_if(|(corner, _)| *corner == corners.len()) {
                     corners.push(index);
-                } else if weights[most] == 1.0 {
-                    corners.push(own[most]);
+                } else if weights[nearest] == 1.0 {
+                    corners.push(own[nearest]);
                 } else {
-                    corners.push(positions.len() as u32);
-                    positions.push(between(own.map(|index| uvs.coordinates[index as usize]), weights));
+                    corners.push(coordinates.len() as u32);
+                    coordinates.push(interpolated(own.map(|index| uvs.coordinates[index as usize]), weights));
                 }
             }
         }
-        Uvs { coordinates: positions, corners: Some(corners), missing: uvs.missing }
+        Uvs { coordinates, corners: Some(corners), missing: uvs.missing }
     }
 
     /// The vertex of the old mesh that a vertex of the new mesh was.
     fn own(&self, vertex: u32) -> Option<u32> {
         match self.vertices[vertex as usize] {
             Origin::Vertex(own) => Some(own),
-            Origin::Place(..) => None,
+            Origin::Position(..) => None,
         }
     }
 
@@ -206,7 +206,7 @@ impl<'a> Origins<'a> {
     /// of these vertices' coordinates: a collapse of two vertices leaves such corners. The index is taken from a triangle that the vertex
     /// shares with the removed corner, where that corner has the same index as on the chart: on the same side of a seam. Corners without
     /// such a triangle are left out.
-    fn beside(&self, uvs: &Uvs, triangles: &[[u32; 3]], sources: &[Source]) -> Vec<(usize, u32)> {
+    fn off_chart(&self, uvs: &Uvs, triangles: &[[u32; 3]], sources: &[Source]) -> Vec<(usize, u32)> {
         // Each with its vertex, and the vertex and index of the removed corner.
         let mut corners: Vec<(usize, u32, [u32; 2])> = Vec::new();
         let parts = sources.iter().enumerate().filter(|(_, source)| matches!(source, Source::Part(_)));
@@ -226,12 +226,12 @@ impl<'a> Origins<'a> {
         if count == 0 {
             return Vec::new();
         }
-        let mut is_asked = vec![false; count];
-        corners.iter().for_each(|(_, name, _)| is_asked[*name as usize] = true);
+        let mut is_wanted = vec![false; count];
+        corners.iter().for_each(|(_, name, _)| is_wanted[*name as usize] = true);
         let mut around: Vec<(u32, usize)> = Vec::new();
         for (triangle, names) in self.old.iter().enumerate() {
-            let asked = names.iter().filter(|name| is_asked.get(**name as usize) == Some(&true));
-            around.extend(asked.map(|name| (*name, triangle)));
+            let wanted = names.iter().filter(|name| is_wanted.get(**name as usize) == Some(&true));
+            around.extend(wanted.map(|name| (*name, triangle)));
         }
         around.sort_unstable();
         let index_in = |triangle: usize, name: u32, [gone, index]: [u32; 2]| {
@@ -250,11 +250,13 @@ impl<'a> Origins<'a> {
 
     /// Whether a vertex joins several old vertices that had different texture coordinates.
     fn joins_seams(&self, uvs: &Uvs, triangles: &[[u32; 3]]) -> bool {
-        let position = |vertex: u32| uvs.coordinates[vertex as usize];
+        let coordinate = |vertex: u32| uvs.coordinates[vertex as usize];
         let is_other = |chart: usize, weights: &Weights, vertex: u32| {
-            let most = heaviest(weights);
+            let nearest = heaviest(weights);
             let own = self.own(vertex);
-            own.is_some_and(|own| weights[most] == 1.0 && position(self.old[chart][most]) != position(own))
+            own.is_some_and(|own| {
+                weights[nearest] == 1.0 && coordinate(self.old[chart][nearest]) != coordinate(own)
+            })
         };
         self.triangles.iter().zip(triangles).any(|((chart, weights), names)| {
             weights.iter().zip(names).any(|(weights, vertex)| is_other(*chart, weights, *vertex))
@@ -273,7 +275,7 @@ mod tests {
         MeshArray { name: name.into(), on, number, values: values.to_vec() }
     }
 
-    /// A square of two triangles, and the same square with its first triangle turned round and its second cut in two, one half of which is
+    /// A square of two triangles, and the same square with its first triangle flipped and its second cut in two, one half of which is
     /// new.
     fn squares() -> (TriMesh, TriMesh) {
         let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 1.0]];
@@ -286,7 +288,7 @@ mod tests {
     const SOURCES: [Source; 3] = [Source::Whole(0), Source::Part(1), Source::New];
 
     #[test]
-    fn what_was_there_keeps_its_numbers_and_what_was_made_lies_between() {
+    fn old_geometry_keeps_its_values_and_those_of_new_geometry_are_interpolated() {
         let (old, new) = squares();
         let arrays = vec![
             array("wet", On::Vertices, Number::F32, &[0.25, 0.5, 0.125, 0.375]),
@@ -374,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn coordinates_that_no_corner_has_any_more_go_where_nothing_is_traced() {
+    fn unused_coordinates_are_removed_where_nothing_is_traced() {
         let (old, mut new) = squares();
         let positions: Vec<[f32; 2]> = (0..6u8).map(|n| [f32::from(n), 0.125 * f32::from(n)]).collect();
         let uvs = Some(Uvs { coordinates: positions.clone(), corners: Some((0..6).collect()), missing: 0 });
@@ -401,7 +403,7 @@ mod tests {
     }
 
     #[test]
-    fn vertices_that_were_joined_do_not_tear_what_lay_on_their_triangles() {
+    fn joined_vertices_do_not_tear_the_texture_of_their_triangles() {
         let (square, _) = squares();
         let positions = [0, 1, 2, 0, 2, 3].map(|n: usize| square.positions[n]).to_vec();
         let soup = TriMesh { positions, triangles: vec![[0, 1, 2], [3, 4, 5]] };

@@ -9,7 +9,7 @@
 //! triangles. Spreading stops at torn triangles.
 
 use super::charts::{Chart, Charts, longest};
-use super::weights::{Weights, between};
+use super::weights::{Weights, interpolated};
 use crate::geometry::mesh::{drop_marked, renumber_kept};
 use crate::geometry::{TriMesh, Uvs};
 
@@ -45,9 +45,9 @@ pub(in crate::mesh_repair) fn textured(
         return;
     }
     let texture = Texture::of(charts, first, mesh);
-    let near = Around::of(charts, out, mesh, is_kept);
+    let near = KeptCoordinates::of(charts, out, mesh, is_kept);
     // The coordinates that vertices keep, and the differences from them.
-    let kept: Vec<Option<u32>> = (0..charts.names.len())
+    let kept: Vec<Option<u32>> = (0..charts.vertices.len())
         .map(|slot| near.nearest(slot, out, texture.own[slot], texture.reach[slot]))
         .collect();
     let differences = kept.iter().zip(&texture.own).map(|(kept, own)| {
@@ -57,14 +57,14 @@ pub(in crate::mesh_repair) fn textured(
     let spread = texture.spread(charts, differences.collect());
     let own = |slot: usize| [0, 1].map(|axis| (texture.own[slot][axis] + spread[slot][axis]) as f32);
     if out.corners.is_none() {
-        for (slot, name) in charts.names.iter().enumerate().filter(|(slot, _)| !is_kept[*slot]) {
+        for (slot, name) in charts.vertices.iter().enumerate().filter(|(slot, _)| !is_kept[*slot]) {
             out.coordinates[*name as usize] = own(slot);
         }
         let is_far = |slot: &usize| is_kept[*slot] && kept[*slot].is_none();
         charts.list.iter_mut().for_each(|chart| chart.is_torn |= chart.slots.iter().any(is_far));
         return;
     }
-    let mut made: Vec<Option<u32>> = vec![None; charts.names.len()];
+    let mut made: Vec<Option<u32>> = vec![None; charts.vertices.len()];
     let mut indices = Vec::with_capacity(3 * charts.list.len());
     for (chart, corners) in charts.list.iter().zip(&texture.corners) {
         for (slot, corner) in chart.slots.into_iter().zip(&corners.of) {
@@ -107,7 +107,7 @@ fn tidy(uvs: &mut Uvs, first: usize) {
 /// Where a corner of a charted triangle takes its coordinate from.
 #[derive(Clone, Copy)]
 enum Corner {
-    /// That of its vertex.
+    /// The coordinate of its vertex.
     Own,
     /// The coordinate at a position on the chart.
     Chart(Pair),
@@ -135,7 +135,7 @@ impl Texture {
         let triangles = &charts.first.mesh.triangles;
         let at = |triangle: usize, weights: &Weights| -> Pair {
             let corners = first.indices(triangles, triangle).map(|index| first.coordinates[index as usize]);
-            between(corners, weights).map(f64::from)
+            interpolated(corners, weights).map(f64::from)
         };
         let own: Vec<Pair> = charts.spots.iter().map(|spot| at(spot.triangle, &spot.weights)).collect();
         // Largest change of coordinates over a metre of a triangle of the first mesh.
@@ -145,7 +145,7 @@ impl Texture {
             let corners = corners.map(|position| position.map(f64::from));
             let of_edge = |[a, b]: [usize; 2]| {
                 let length = (positions[b] - positions[a]).norm();
-                if length > 0.0 { apart(corners[a], corners[b]) / length } else { 0.0 }
+                if length > 0.0 { distance(corners[a], corners[b]) / length } else { 0.0 }
             };
             EDGES.into_iter().map(of_edge).fold(0.0, f64::max)
         };
@@ -154,20 +154,20 @@ impl Texture {
             let of_chart = rate(chart.triangle);
             let corner = |n: usize| {
                 let (slot, weights) = (chart.slots[n], &chart.corners[n]);
-                let there = at(chart.triangle, weights);
-                let way = (charts.position(&charts.spots[slot]) - charts.at(chart.triangle, weights)).norm();
-                let most = SEAMLESS * of_chart.max(rates[slot]) * way + ROUNDING;
-                let is_own = !chart.is_torn && apart(own[slot], there) <= most;
-                if is_own { (Corner::Own, own[slot]) } else { (Corner::Chart(there), there) }
+                let on_chart = at(chart.triangle, weights);
+                let off = (charts.position(&charts.spots[slot]) - charts.at(chart.triangle, weights)).norm();
+                let max_difference = SEAMLESS * of_chart.max(rates[slot]) * off + ROUNDING;
+                let is_own = !chart.is_torn && distance(own[slot], on_chart) <= max_difference;
+                if is_own { (Corner::Own, own[slot]) } else { (Corner::Chart(on_chart), on_chart) }
             };
             let found = [0, 1, 2].map(corner);
-            let of_edge = |[a, b]: [usize; 2]| apart(found[a].1, found[b].1);
+            let of_edge = |[a, b]: [usize; 2]| distance(found[a].1, found[b].1);
             let long = EDGES.into_iter().map(of_edge).fold(0.0, f64::max);
             let reach = SAME * long.max(of_chart * longest(&mesh.corners(chart.number)));
             Corners { of: found.map(|(corner, _)| corner), reach }
         };
         let corners: Vec<Corners> = charts.list.iter().map(corners_of).collect();
-        let mut reach = vec![0.0f64; charts.names.len()];
+        let mut reach = vec![0.0f64; charts.vertices.len()];
         for (chart, corners) in charts.list.iter().zip(&corners).filter(|(chart, _)| !chart.is_torn) {
             for slot in chart.slots {
                 reach[slot] = reach[slot].max(corners.reach);
@@ -211,15 +211,15 @@ impl Texture {
 }
 
 /// The coordinates that the charts' vertices have in other triangles: slots, each with the indices of its coordinates, ascending.
-struct Around(Vec<(usize, u32)>);
+struct KeptCoordinates(Vec<(usize, u32)>);
 
-impl Around {
+impl KeptCoordinates {
     fn of(charts: &Charts<'_>, out: &Uvs, mesh: &TriMesh, is_kept: &[bool]) -> Self {
         let mut slots = vec![None; mesh.positions.len()];
-        charts.names.iter().enumerate().for_each(|(slot, name)| slots[*name as usize] = Some(slot));
+        charts.vertices.iter().enumerate().for_each(|(slot, name)| slots[*name as usize] = Some(slot));
         let mut list = Vec::new();
         if out.corners.is_none() {
-            let kept = charts.names.iter().enumerate().filter(|(slot, _)| is_kept[*slot]);
+            let kept = charts.vertices.iter().enumerate().filter(|(slot, _)| is_kept[*slot]);
             list.extend(kept.map(|(slot, name)| (slot, *name)));
             return Self(list);
         }
@@ -238,7 +238,7 @@ impl Around {
     fn nearest(&self, slot: usize, uvs: &Uvs, position: Pair, reach: f64) -> Option<u32> {
         let begin = self.0.partition_point(|(other, _)| *other < slot);
         let own = self.0[begin..].iter().take_while(|(other, _)| *other == slot);
-        let far = |index: u32| apart(uvs.coordinates[index as usize].map(f64::from), position);
+        let far = |index: u32| distance(uvs.coordinates[index as usize].map(f64::from), position);
         let all = own.map(|(_, index)| (far(*index), *index));
         let nearest = all.fold(None, |best: Option<(f64, u32)>, next| match best {
             Some(best) if best.0 <= next.0 => Some(best),
@@ -249,7 +249,7 @@ impl Around {
 }
 
 /// Distance between two coordinates.
-fn apart(a: Pair, b: Pair) -> f64 {
+fn distance(a: Pair, b: Pair) -> f64 {
     let [u, v] = [b[0] - a[0], b[1] - a[1]];
     (u * u + v * v).sqrt()
 }

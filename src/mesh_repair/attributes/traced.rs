@@ -17,7 +17,7 @@ impl Traced<'_> {
     pub const MASK: &'static str = "rebuilt";
 
     /// Writes the values of the first frame over those taken from the previous mesh.
-    pub(in crate::mesh_repair) fn put(
+    pub(in crate::mesh_repair) fn apply(
         &self,
         out: &mut DetailedMesh,
         vertices: &[Option<u32>],
@@ -72,7 +72,7 @@ mod tests {
     /// Texture coordinates per metre.
     const SCALE: f32 = 0.125;
     /// Displacement of the liquid along x, and the distance of coordinates across a seam.
-    const WAY: f32 = 32.0;
+    const SHIFT: f32 = 32.0;
     const SEAM: f32 = 5.0;
 
     /// A sheet of square cells of 1 m, two triangles each.
@@ -135,8 +135,8 @@ mod tests {
     /// x at the first frame than according to the previous mesh, and within `lost` (m) of x = 4 also 8 m to the side.
     fn after(kind: Kind, astray: f64, lost: f32) -> (DetailedMesh, Vec<Source>) {
         let first = first(kind);
-        let old = DetailedMesh { mesh: sheet(WAY), ..first.clone() };
-        let mut new = sheet(WAY);
+        let old = DetailedMesh { mesh: sheet(SHIFT), ..first.clone() };
+        let mut new = sheet(SHIFT);
         let mut origins: Vec<Option<u32>> = (0..new.positions.len() as u32).map(Some).collect();
         for vertex in (0..origins.len()).filter(|vertex| is_made(*vertex)) {
             origins[vertex] = None;
@@ -148,8 +148,8 @@ mod tests {
         };
         let sources: Vec<Source> = (0..).zip(&new.triangles).map(source).collect();
         let position = |position: &Vec3| {
-            let aside = if (position.x - WAY - 4.0).abs() < lost { 8.0 } else { 0.0 };
-            Some(position.cast::<f64>() - DVec3::new(f64::from(WAY) - astray, -aside, 0.0))
+            let aside = if (position.x - SHIFT - 4.0).abs() < lost { 8.0 } else { 0.0 };
+            Some(position.cast::<f64>() - DVec3::new(f64::from(SHIFT) - astray, -aside, 0.0))
         };
         let positions: Vec<Option<DVec3>> = new.positions.iter().map(position).collect();
         let traced = Traced { first: &first, tree: None, positions: &positions, spacing: 1.0 };
@@ -181,7 +181,8 @@ mod tests {
                     assert_eq!(mask(&out)[triangle], f64::from(u8::from(*source == Source::New)));
                     let names = out.mesh.triangles[triangle];
                     for (name, ([u, v], position)) in names.into_iter().zip(corners(&out, triangle)) {
-                        let off = (u - SCALE * (position.x - WAY)).abs().max((v - SCALE * position.y).abs());
+                        let off =
+                            (u - SCALE * (position.x - SHIFT)).abs().max((v - SCALE * position.y).abs());
                         // Away from kept triangles the particles' own texture counts more and more.
                         let most = if *source == Source::New { SCALE * astray as f32 } else { 0.0 };
                         assert!(off < most + 1e-5, "{triangle}, {source:?}: {u} {v} at {position}");
@@ -196,7 +197,7 @@ mod tests {
                 assert_eq!(corners_there, 6);
                 let [x, number] = [0, 1].map(|n: usize| &out.arrays[n].values);
                 for (vertex, position) in out.mesh.positions.iter().enumerate() {
-                    let wanted = f64::from(position.x - WAY) + if is_made(vertex) { astray } else { 0.0 };
+                    let wanted = f64::from(position.x - SHIFT) + if is_made(vertex) { astray } else { 0.0 };
                     assert!((x[vertex] - wanted).abs() < 1e-4, "{vertex}: {} {wanted}", x[vertex]);
                 }
                 assert!((0..sources.len()).all(|n| astray > 0.0 || (number[n] - n as f64).abs() < 40.0));
@@ -221,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn where_other_liquid_came_there_is_a_seam_or_a_mark() {
+    fn liquid_from_elsewhere_leaves_a_seam_or_a_mark() {
         let astray = 6.0;
         for kind in [Kind::OfVertices, Kind::OfCorners] {
             let (out, sources) = after(kind, astray, 0.0);
@@ -237,7 +238,7 @@ mod tests {
                 let by = if is_new { astray as f32 } else { 0.0 };
                 for ([u, _], position) in corners(&out, triangle) {
                     assert!(
-                        (u - SCALE * (position.x - WAY + by)).abs() < 1e-5,
+                        (u - SCALE * (position.x - SHIFT + by)).abs() < 1e-5,
                         "{triangle}: {u} at {position}"
                     );
                 }
@@ -246,9 +247,9 @@ mod tests {
     }
 
     #[test]
-    fn triangles_of_liquids_that_were_apart_are_marked_and_not_smeared() {
+    fn triangles_between_separate_bodies_of_liquid_are_marked_and_not_smeared() {
         let (out, sources) = after(Kind::OfCorners, 0.0, 0.6);
-        let is_lost = |position: &Vec3| (position.x - WAY - 4.0).abs() < 0.6;
+        let is_lost = |position: &Vec3| (position.x - SHIFT - 4.0).abs() < 0.6;
         let mut torn = 0;
         for (triangle, source) in sources.iter().enumerate().filter(|(_, source)| **source == Source::New) {
             let corners = corners(&out, triangle);

@@ -12,7 +12,7 @@ const NEEDLE: f64 = 1e-8;
 pub type Weights = [f64; 3];
 
 /// The weights of a corner.
-pub(in crate::mesh_repair) fn alone(corner: usize) -> Weights {
+pub(in crate::mesh_repair) fn at_corner(corner: usize) -> Weights {
     let mut weights = [0.0; 3];
     weights[corner] = 1.0;
     weights
@@ -32,26 +32,26 @@ pub(in crate::mesh_repair) fn heaviest(&[a, b, c]: &Weights) -> usize {
 /// The position on a triangle that is nearest to another position (m); if it is a corner's, exactly this corner.
 pub fn weights(corners: &[DVec3; 3], position: DVec3) -> Weights {
     if let Some(corner) = corners.iter().position(|corner| *corner == position) {
-        return alone(corner);
+        return at_corner(corner);
     }
     let [a, b, c] = corners;
-    let (ab, ac, way) = (b - a, c - a, position - a);
+    let (ab, ac, ap) = (b - a, c - a, position - a);
     let normal = ab.cross(&ac);
     let square = normal.norm_squared();
     if square > NEEDLE * NEEDLE * ab.norm_squared() * ac.norm_squared() {
         // Shares of the area; rounding leaves them a sum of 1.
-        let (of_b, of_c) = (way.cross(&ac).dot(&normal) / square, ab.cross(&way).dot(&normal) / square);
+        let (of_b, of_c) = (ap.cross(&ac).dot(&normal) / square, ab.cross(&ap).dot(&normal) / square);
         let weights = [1.0 - of_b - of_c, of_b, of_c];
         if weights.iter().all(|weight| *weight >= 0.0) {
             return weights;
         }
     }
-    let mut best = (f64::INFINITY, alone(0));
+    let mut best = (f64::INFINITY, at_corner(0));
     for (from, to) in [(0, 1), (1, 2), (2, 0)] {
         let along = corners[to] - corners[from];
         let square = along.norm_squared();
-        let way = (position - corners[from]).dot(&along);
-        let share = if square > 0.0 { (way / square).clamp(0.0, 1.0) } else { 0.0 };
+        let projection = (position - corners[from]).dot(&along);
+        let share = if square > 0.0 { (projection / square).clamp(0.0, 1.0) } else { 0.0 };
         let far = (corners[from] + along * share - position).norm_squared();
         if far < best.0 {
             let mut weights = [0.0; 3];
@@ -74,28 +74,28 @@ pub(in crate::mesh_repair) fn blended(
         On::Corners => [0, 1, 2].map(|corner| array.values[3 * triangle + corner]),
         _ => triangles[triangle].map(|vertex| array.values[vertex as usize]),
     };
-    let most = heaviest(weights);
-    if weights[most] == 1.0 {
-        return numbers[most];
+    let nearest = heaviest(weights);
+    if weights[nearest] == 1.0 {
+        return numbers[nearest];
     }
     match array.number {
         Number::F64 => mean(numbers, weights),
         Number::F32 => f64::from(mean(numbers, weights) as f32),
         Number::I8 | Number::U8 if COLOURS.contains(&&*array.name) => mean(numbers, weights).round(),
-        _ => numbers[most],
+        _ => numbers[nearest],
     }
 }
 
 /// Texture coordinates at a position, from those of the corners.
-pub(in crate::mesh_repair) fn between(positions: [[f32; 2]; 3], weights: &Weights) -> [f32; 2] {
+pub(in crate::mesh_repair) fn interpolated(positions: [[f32; 2]; 3], weights: &Weights) -> [f32; 2] {
     [0, 1].map(|axis| mean(positions.map(|position| f64::from(position[axis])), weights) as f32)
 }
 
 /// The weighted mean of three numbers: exact if all are equal; numbers of weight 0 are ignored.
 fn mean(numbers: [f64; 3], weights: &Weights) -> f64 {
-    let most = heaviest(weights);
-    let others = (0..3).filter(|corner| *corner != most && weights[*corner] > 0.0);
-    others.fold(numbers[most], |sum, corner| sum + weights[corner] * (numbers[corner] - numbers[most]))
+    let nearest = heaviest(weights);
+    let others = (0..3).filter(|corner| *corner != nearest && weights[*corner] > 0.0);
+    others.fold(numbers[nearest], |sum, corner| sum + weights[corner] * (numbers[corner] - numbers[nearest]))
 }
 
 #[cfg(test)]

@@ -39,14 +39,14 @@ pub struct Passage {
 }
 
 /// The two cells that a face lies between: the one before it and the one behind it.
-pub fn beside((axis, cell): GridFace) -> [Coord; 2] {
+pub fn cells_beside((axis, cell): GridFace) -> [Coord; 2] {
     let mut before = cell;
     before[axis] -= 1;
     [before, cell]
 }
 
 /// The four cells around an edge of the grid, in order.
-pub fn around((axis, node): GridEdge) -> [Coord; 4] {
+pub fn cells_around((axis, node): GridEdge) -> [Coord; 4] {
     let (b, c) = ((axis + 1) % 3, (axis + 2) % 3);
     [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[back, down]| {
         let mut cell = node;
@@ -94,8 +94,8 @@ fn is_beyond(p: Fixed, q: Fixed, (a, n): (usize, i32), (b, m): (usize, i32)) -> 
     }
 }
 
-/// The faces of the grid that the segment from vertex `a` to vertex `b` passes through, in order. None where the predicates contradict each
-/// other, which exact ones never do.
+/// The faces of the grid that the segment from vertex `a` to vertex `b` passes through, in order. None if the predicates contradict each
+/// other, which cannot happen as they are exact.
 pub fn passages(a: Fixed, b: Fixed) -> Option<Vec<Passage>> {
     let (mut cell, last) = (cell_of(a), cell_of(b));
     let steps: i32 = (0..3).map(|axis| (last[axis] - cell[axis]).abs()).sum();
@@ -140,7 +140,7 @@ pub struct Segment {
 
 /// How a triangle lies in the grid.
 #[derive(Debug, Default)]
-pub struct Traced {
+pub struct Trace {
     /// Cells of the three corners.
     pub cells: [Coord; 3],
     /// For each edge, from a corner to the next.
@@ -151,10 +151,10 @@ pub struct Traced {
 
 /// Traces triangle `number`, with these vertices and their positions, which passes through these edges of the grid, ascending. None if the
 /// data are inconsistent: the triangle has no area on the lattice in some view, or edges are missing.
-pub fn trace(number: u32, names: [u32; 3], v: [Fixed; 3], pierced: &[GridEdge]) -> Option<Traced> {
-    let mut traced = Traced { cells: v.map(cell_of), ..Traced::default() };
+pub fn trace(number: u32, names: [u32; 3], v: [Fixed; 3], pierced: &[GridEdge]) -> Option<Trace> {
+    let mut traced = Trace { cells: v.map(cell_of), ..Trace::default() };
     for edge in 0..3 {
-        traced.edges[edge] = way(names, v, edge)?;
+        traced.edges[edge] = edge_passages(names, v, edge)?;
     }
     // Each plane that it passes through is entered and left once.
     let mut planes: Vec<(usize, i32)> = traced
@@ -186,16 +186,16 @@ pub fn trace(number: u32, names: [u32; 3], v: [Fixed; 3], pierced: &[GridEdge]) 
         while at != last {
             let others = [(axis + 1) % 3, (axis + 2) % 3];
             let step = others.into_iter().find_map(|across| {
-                let way = (last[across] - at[across]).signum();
+                let sign = (last[across] - at[across]).signum();
                 let mut node = at;
-                node[across] += way.max(0);
+                node[across] += sign.max(0);
                 let edge = (3 - axis - across, node);
-                (way != 0 && pierced.binary_search(&edge).is_ok()).then_some((across, way, edge))
+                (sign != 0 && pierced.binary_search(&edge).is_ok()).then_some((across, sign, edge))
             });
-            let (across, way, edge) = step?;
+            let (across, sign, edge) = step?;
             let point = Point::OnTriangle(number, edge);
             traced.segments.push(Segment { face: (axis, at), ends: [from, point] });
-            at[across] += way;
+            at[across] += sign;
             from = point;
         }
         traced.segments.push(Segment { face: (axis, at), ends: [from, to] });
@@ -205,7 +205,7 @@ pub fn trace(number: u32, names: [u32; 3], v: [Fixed; 3], pierced: &[GridEdge]) 
 
 /// The passages of an edge of a triangle, from its corner to the next; computed from the lower vertex, so that both its triangles find the
 /// same ones.
-fn way(names: [u32; 3], v: [Fixed; 3], edge: usize) -> Option<Vec<Passage>> {
+fn edge_passages(names: [u32; 3], v: [Fixed; 3], edge: usize) -> Option<Vec<Passage>> {
     let next = (edge + 1) % 3;
     if names[edge] < names[next] {
         return passages(v[edge], v[next]);

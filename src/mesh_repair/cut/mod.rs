@@ -11,7 +11,7 @@ mod polygon;
 
 use rayon::prelude::*;
 
-use exact::{GridFace, Point, Traced, beside, on_edge, to_cells, trace};
+use exact::{GridFace, Point, Trace, cells_beside, on_edge, to_cells, trace};
 use pierces::Pierces;
 
 use super::region::CellSet;
@@ -21,8 +21,8 @@ use crate::geometry::{Coord, DVec3};
 
 /// Triangles per task.
 const GRAIN: usize = 1024;
-/// Largest number of cells in a box that are checked one by one before a triangle is traced.
-const FEW: i64 = 64;
+/// Maximum cells of a triangle's bounding box that are checked one by one before the triangle is traced.
+const MAX_BOX: i64 = 64;
 
 /// A closed mesh on the lattice.
 pub struct Shape {
@@ -71,7 +71,7 @@ impl Shape {
         self.triangles[triangle as usize].map(|name| self.fixed[name as usize])
     }
 
-    fn traced(&self, triangle: u32) -> Option<Traced> {
+    fn traced(&self, triangle: u32) -> Option<Trace> {
         let names = self.triangles[triangle as usize];
         trace(triangle, names, self.corners(triangle), self.pierces.of_triangle(triangle))
     }
@@ -127,7 +127,7 @@ impl Shape {
     fn cut_one(&self, triangle: u32, set: &CellSet, out: &mut Cut) -> Option<()> {
         let (low, high) = bounds(self.corners(triangle));
         let size = (0..3).map(|axis| i64::from(high[axis] - low[axis]) + 1).product::<i64>();
-        if size <= FEW {
+        if size <= MAX_BOX {
             let held = between(low, high).filter(|cell| set.holds(*cell)).count() as i64;
             if held == 0 {
                 out.whole.push(triangle);
@@ -157,7 +157,7 @@ impl Shape {
     fn halves(
         &self,
         triangle: u32,
-        traced: &Traced,
+        traced: &Trace,
         set: &CellSet,
         rim: &mut Vec<(GridFace, [Point; 2])>,
     ) -> Vec<Half> {
@@ -168,7 +168,7 @@ impl Shape {
             let mut cell = traced.cells[edge];
             let mut from = (!set.holds(cell)).then_some(Point::Vertex(name));
             for passage in passages {
-                let behind = beside(passage.face)[usize::from(passage.is_onward)];
+                let behind = cells_beside(passage.face)[usize::from(passage.is_onward)];
                 if set.holds(behind) != set.holds(cell) {
                     let (axis, at) = passage.face;
                     let point = Point::OnEdge([name.min(next), name.max(next)], axis, at[axis]);
@@ -184,7 +184,7 @@ impl Shape {
             }
         }
         for segment in &traced.segments {
-            let [before, behind] = beside(segment.face);
+            let [before, behind] = cells_beside(segment.face);
             let [a, b] = segment.ends;
             match [before, behind].map(|cell| set.holds(cell)) {
                 [true, false] => {
@@ -210,9 +210,9 @@ pub struct Half {
 }
 
 /// The cells that a triangle passes through; some appear more than once.
-fn cells(traced: &Traced) -> Vec<Coord> {
-    let through = traced.edges.iter().flatten().flat_map(|passage| beside(passage.face));
-    let across = traced.segments.iter().flat_map(|segment| beside(segment.face));
+fn cells(traced: &Trace) -> Vec<Coord> {
+    let through = traced.edges.iter().flatten().flat_map(|passage| cells_beside(passage.face));
+    let across = traced.segments.iter().flat_map(|segment| cells_beside(segment.face));
     traced.cells.into_iter().chain(through).chain(across).collect()
 }
 

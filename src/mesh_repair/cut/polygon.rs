@@ -6,7 +6,7 @@ use crate::geometry::triangulate::ear_clipping::turn;
 use crate::geometry::triangulate::{ear_clipping, monotone};
 
 /// Maximum number of corners of a polygon that is triangulated by ear clipping.
-const FEW_CORNERS: usize = 200;
+const MAX_EAR_CLIPPED: usize = 200;
 
 type Corner = (Point, [f64; 2]);
 
@@ -44,7 +44,7 @@ pub fn polygons(shape: &Shape, triangle: u32, halves: Vec<Half>) -> Option<Vec<[
             return None;
         }
         let flat: Vec<[f64; 2]> = ring.iter().map(|(_, at)| *at).collect();
-        let cut = if flat.len() > FEW_CORNERS { monotone::triangles } else { ear_clipping::triangles };
+        let cut = if flat.len() > MAX_EAR_CLIPPED { monotone::triangles } else { ear_clipping::triangles };
         out.extend(cut(&flat).into_iter().map(|corners| corners.map(|at| ring[at].0)));
     }
     Some(out)
@@ -67,9 +67,9 @@ fn rings(mut halves: Vec<Half>) -> Option<Vec<Vec<Point>>> {
             let [_, to] = halves[at].ends;
             let first = halves.partition_point(|half| half.ends[0] < to);
             let onward = (first..halves.len()).take_while(|next| halves[*next].ends[0] == to);
-            let fits = |next: &usize| halves[*next].cell == halves[at].cell;
+            let is_same_cell = |next: &usize| halves[*next].cell == halves[at].cell;
             let open: Vec<usize> = onward.filter(|next| !is_done[*next] || *next == start).collect();
-            let next = *open.iter().find(|next| open.len() == 1 || fits(next))?;
+            let next = *open.iter().find(|next| open.len() == 1 || is_same_cell(next))?;
             if next == start {
                 break;
             }

@@ -12,16 +12,16 @@ use crate::geometry::{DVec3, PolygonMesh, Vec3};
 use crate::mesh_repair::prepare::Closed;
 
 /// Maximum number of corners of a ring that is triangulated between its corners: larger ones take too long.
-const MOST_CORNERS: usize = 500;
+const MAX_CORNERS: usize = 500;
 /// Largest distance of the corners of such a ring from its mean plane, over their largest distance from its middle.
 const FLAT: f64 = 0.5;
-/// Number of edges compared where several lead on from a vertex.
-const WAYS: usize = 8;
+/// Maximum edges compared where several leave a vertex.
+const MAX_BRANCHES: usize = 8;
 
 /// Closes the holes of triangles with these edges, so that along every edge as many triangles run in one direction as in the other. A ring
 /// of three around which a triangle already runs in the other direction is no hole: that triangle is left out.
 pub(in crate::mesh_repair) fn close(closed: &mut Closed, uses: &[Use]) {
-    let rings = rings(closed.mesh.positions.len(), lacking(&closed.mesh.triangles, uses));
+    let rings = rings(closed.mesh.positions.len(), missing_edges(&closed.mesh.triangles, uses));
     let mut is_out = vec![false; closed.mesh.triangles.len()];
     let mut made = BTreeSet::new();
     for ring in rings {
@@ -45,14 +45,14 @@ pub(in crate::mesh_repair) fn close(closed: &mut Closed, uses: &[Use]) {
 }
 
 /// The directed edges to add so that each edge is used equally often in both directions.
-fn lacking(triangles: &[[u32; 3]], uses: &[Use]) -> Vec<[u32; 2]> {
+fn missing_edges(triangles: &[[u32; 3]], uses: &[Use]) -> Vec<[u32; 2]> {
     let mut out = Vec::new();
     for run in uses.chunk_by(is_same_edge) {
         let ends = run[0].0;
-        let along = run.iter().filter(|used| runs(&triangles[used.1 as usize], ends)).count();
-        let back = run.len() - along;
-        out.extend(repeat_n([ends[1], ends[0]], along.saturating_sub(back)));
-        out.extend(repeat_n(ends, back.saturating_sub(along)));
+        let forward = run.iter().filter(|used| runs(&triangles[used.1 as usize], ends)).count();
+        let back = run.len() - forward;
+        out.extend(repeat_n([ends[1], ends[0]], forward.saturating_sub(back)));
+        out.extend(repeat_n(ends, back.saturating_sub(forward)));
     }
     out
 }
@@ -88,9 +88,10 @@ fn rings(vertices: usize, mut edges: Vec<[u32; 2]>) -> Vec<Vec<u32>> {
                 path.push(at as u32);
                 position[at] = path.len();
                 // An edge that closes a ring goes first, the smallest ring before others.
-                let ways = (next[at]..begins[at + 1]).take(WAYS);
-                let way = ways.max_by_key(|&way| position[edges[way][1] as usize]).unwrap_or(next[at]);
-                edges.swap(way, next[at]);
+                let branches = (next[at]..begins[at + 1]).take(MAX_BRANCHES);
+                let branch =
+                    branches.max_by_key(|&edge| position[edges[edge][1] as usize]).unwrap_or(next[at]);
+                edges.swap(branch, next[at]);
                 let to = edges[next[at]][1];
                 next[at] += 1;
                 at = to as usize;
@@ -101,7 +102,7 @@ fn rings(vertices: usize, mut edges: Vec<[u32; 2]>) -> Vec<Vec<u32>> {
 }
 
 /// The triangles that have an edge.
-fn along(uses: &[Use], ends: [u32; 2]) -> &[Use] {
+fn uses_of(uses: &[Use], ends: [u32; 2]) -> &[Use] {
     let begin = uses.partition_point(|used| used.0 < ends);
     let count = uses[begin..].partition_point(|used| used.0 == ends);
     &uses[begin..begin + count]
@@ -109,17 +110,17 @@ fn along(uses: &[Use], ends: [u32; 2]) -> &[Use] {
 
 /// A triangle, not yet left out, with these corners in this order, starting at any of them.
 fn find(uses: &[Use], triangles: &[[u32; 3]], corners: [u32; 3], is_out: &[bool]) -> Option<u32> {
-    let runs = sides(&corners).map(|ends| along(uses, ends));
+    let runs = sides(&corners).map(|ends| uses_of(uses, ends));
     let fewest = runs.into_iter().min_by_key(|run| run.len())?;
-    let is_it = |at: &u32| !is_out[*at as usize] && rotated(triangles[*at as usize]) == rotated(corners);
-    fewest.iter().map(|used| used.1).find(is_it)
+    let is_match = |at: &u32| !is_out[*at as usize] && rotated(triangles[*at as usize]) == rotated(corners);
+    fewest.iter().map(|used| used.1).find(is_match)
 }
 
 /// Triangulates a ring between its corners. None if it has too many corners or is not flat enough, or if one of the triangles would share an
 /// inner edge with an existing triangle, or with one of those that have been `made`.
 fn cut(positions: &[Vec3], ring: &[u32], uses: &[Use], made: &BTreeSet<[u32; 2]>) -> Option<Vec<[u32; 3]>> {
-    let places: Vec<DVec3> = ring.iter().map(|&vertex| positions[vertex as usize].cast()).collect();
-    if ring.len() > MOST_CORNERS || !is_flat_enough(&places) {
+    let corners: Vec<DVec3> = ring.iter().map(|&vertex| positions[vertex as usize].cast()).collect();
+    if ring.len() > MAX_CORNERS || !is_flat_enough(&corners) {
         return None;
     }
     // Starting at the next corner gives a convex ring other inner edges.
@@ -135,7 +136,7 @@ fn cut(positions: &[Vec3], ring: &[u32], uses: &[Use], made: &BTreeSet<[u32; 2]>
             let is_inner = j - i != 1 && (i, j) != (0, count - 1);
             let [a, b] = [i, j].map(|corner| ring[corner as usize]);
             let ends = [a.min(b), a.max(b)];
-            !is_inner || along(uses, ends).is_empty() && !made.contains(&ends)
+            !is_inner || uses_of(uses, ends).is_empty() && !made.contains(&ends)
         };
         let is_free = triangles.iter().flat_map(sides).all(|ends| is_free(&ends));
         is_free.then(|| triangles.iter().map(|corners| corners.map(|corner| ring[corner as usize])).collect())
@@ -189,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn edges_do_not_get_crowded() {
+    fn edges_stay_manifold() {
         // The diagonal of the square is already in use.
         let positions = vec![Vec3::zeros(), Vec3::x(), Vec3::new(1.0, 1.0, 0.0), Vec3::y()];
         let (out, prepared) = checked(&TriMesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]] });
@@ -251,8 +252,8 @@ mod tests {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 33) % below
         };
-        let mut positions = |count: usize, places: u64| -> Vec<Vec3> {
-            (0..count).map(|_| Vec3::from([0; 3].map(|_| random(places) as f32))).collect()
+        let mut positions = |count: usize, range: u64| -> Vec<Vec3> {
+            (0..count).map(|_| Vec3::from([0; 3].map(|_| random(range) as f32))).collect()
         };
         let (few, far) = (positions(40, 4), positions(40, 1000));
         // A Moebius strip: each edge between its triangles is used in one direction only, once.

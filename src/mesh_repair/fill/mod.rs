@@ -6,7 +6,7 @@
 
 pub(in crate::mesh_repair) mod holes;
 
-use super::cut::exact::{GridEdge, GridFace, Point, around};
+use super::cut::exact::{GridEdge, GridFace, Point, cells_around};
 use super::cut::{Cut, Shape, Trouble};
 use super::region::{CellSet, Inside};
 use crate::geometry::Coord;
@@ -28,7 +28,7 @@ pub struct Fill {
 /// The paths of the cut on outer faces, from grid edge to grid edge.
 pub struct Rim {
     /// Ascending by face.
-    ways: Vec<(GridFace, Vec<Point>)>,
+    paths: Vec<(GridFace, Vec<Point>)>,
 }
 
 impl Rim {
@@ -37,22 +37,23 @@ impl Rim {
     /// # Errors
     /// The cells outside faces on which the segments form a closed ring, or do not join.
     pub fn of(cut: &Cut, set: &CellSet) -> Result<Self, Trouble> {
-        let (mut ways, mut trouble) = (Vec::new(), Vec::new());
+        let (mut paths, mut trouble) = (Vec::new(), Vec::new());
         for segments in cut.rim.chunk_by(|a, b| a.0 == b.0) {
             let face = segments[0].0;
             match joined(segments) {
-                Some(joined) => ways.extend(joined.into_iter().map(|way| (face, way))),
-                None => trouble
-                    .extend(super::cut::exact::beside(face).into_iter().filter(|cell| !set.holds(*cell))),
+                Some(joined) => paths.extend(joined.into_iter().map(|path| (face, path))),
+                None => trouble.extend(
+                    super::cut::exact::cells_beside(face).into_iter().filter(|cell| !set.holds(*cell)),
+                ),
             }
         }
-        if trouble.is_empty() { Ok(Self { ways }) } else { Err(Trouble(trouble)) }
+        if trouble.is_empty() { Ok(Self { paths }) } else { Err(Trouble(trouble)) }
     }
 
     fn on(&self, face: GridFace) -> &[(GridFace, Vec<Point>)] {
-        let first = self.ways.partition_point(|(other, _)| *other < face);
-        let count = self.ways[first..].iter().take_while(|(other, _)| *other == face).count();
-        &self.ways[first..first + count]
+        let first = self.paths.partition_point(|(other, _)| *other < face);
+        let count = self.paths[first..].iter().take_while(|(other, _)| *other == face).count();
+        &self.paths[first..first + count]
     }
 }
 
@@ -62,25 +63,25 @@ fn joined(segments: &[(GridFace, [Point; 2])]) -> Option<Vec<Vec<Point>>> {
         return None;
     }
     let is_end = |point: Point| matches!(point, Point::OnTriangle(..));
-    let mut ways = Vec::new();
+    let mut paths = Vec::new();
     let mut used = 0;
     for (_, [from, _]) in segments.iter().filter(|(_, ends)| is_end(ends[0])) {
-        let mut way = vec![*from];
+        let mut path = vec![*from];
         loop {
-            let at = segments.binary_search_by(|(_, ends)| ends[0].cmp(way.last().unwrap_or(from))).ok()?;
+            let at = segments.binary_search_by(|(_, ends)| ends[0].cmp(path.last().unwrap_or(from))).ok()?;
             used += 1;
             let to = segments[at].1[1];
-            way.push(to);
+            path.push(to);
             if is_end(to) {
                 break;
             }
-            if way.len() > segments.len() + 1 {
+            if path.len() > segments.len() + 1 {
                 return None;
             }
         }
-        ways.push(way);
+        paths.push(path);
     }
-    (used == segments.len()).then_some(ways)
+    (used == segments.len()).then_some(paths)
 }
 
 /// Fills a set of cells.
@@ -124,7 +125,7 @@ impl<I: Inside> Cube<'_, I> {
     /// Where the surface crosses an edge of the cube; on an outer edge, where the mesh does.
     fn point(&self, edge: Edge, out: &mut Fill) -> Option<Point> {
         let edge = self.edge(edge);
-        if around(edge).iter().all(|cell| self.set.holds(*cell)) {
+        if cells_around(edge).iter().all(|cell| self.set.holds(*cell)) {
             out.shares.push((edge, self.share(edge).clamp(NEAR, 1.0 - NEAR)));
             return Some(Point::OnGrid(edge));
         }
@@ -166,19 +167,19 @@ impl<I: Inside> Cube<'_, I> {
             }
             return Some(());
         }
-        let mut ways: Vec<Vec<Point>> = Vec::new();
+        let mut paths: Vec<Vec<Point>> = Vec::new();
         for (face, corners) in FACES.iter().enumerate() {
             if is_outer[face] {
                 let mut behind = self.cell;
                 behind[face / 2] += (face % 2) as i32;
-                ways.extend(self.rim.on((face / 2, behind)).iter().map(|(_, way)| way.clone()));
+                paths.extend(self.rim.on((face / 2, behind)).iter().map(|(_, path)| path.clone()));
             } else {
                 for [from, to] in lines(case, corners) {
-                    ways.push(vec![self.point(from, out)?, self.point(to, out)?]);
+                    paths.push(vec![self.point(from, out)?, self.point(to, out)?]);
                 }
             }
         }
-        let rings = rings(ways)?;
+        let rings = rings(paths)?;
         for (ring, number) in rings.into_iter().zip(0..) {
             self.fill_ring(ring, number, out);
         }
@@ -209,16 +210,16 @@ impl<I: Inside> Cube<'_, I> {
 }
 
 /// Joins paths to rings, each point once; none if they do not join.
-fn rings(mut ways: Vec<Vec<Point>>) -> Option<Vec<Vec<Point>>> {
+fn rings(mut paths: Vec<Vec<Point>>) -> Option<Vec<Vec<Point>>> {
     let mut rings = Vec::new();
-    while let Some(mut ring) = ways.pop() {
+    while let Some(mut ring) = paths.pop() {
         loop {
             let to = ring.pop()?;
             if to == ring[0] {
                 break;
             }
-            let next = ways.iter().position(|way| way[0] == to)?;
-            ring.extend(ways.swap_remove(next));
+            let next = paths.iter().position(|path| path[0] == to)?;
+            ring.extend(paths.swap_remove(next));
         }
         rings.push(ring);
     }

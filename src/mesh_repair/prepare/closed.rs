@@ -9,10 +9,10 @@ use crate::geometry::{DVec3, TriMesh};
 /// Triangles that are closed as a chain and turned outward: along every edge as many run in one direction as in the other.
 #[derive(Debug)]
 pub(in crate::mesh_repair) struct Closed {
-    /// All of the input's vertices first, in their order, then those that close holes; triangles likewise. A triangle that was turned
-    /// round keeps its first corner.
+    /// All of the input's vertices first, in their order, then those that close holes; triangles likewise. A flipped triangle keeps
+    /// its first corner.
     pub mesh: TriMesh,
-    /// The triangle of the mesh that each one was; none if it closes a hole.
+    /// For each triangle, its index in the input; none if it closes a hole.
     pub sources: Vec<Option<u32>>,
     /// What was done.
     pub prepared: Prepared,
@@ -21,29 +21,29 @@ pub(in crate::mesh_repair) struct Closed {
 impl Closed {
     /// Joins coinciding vertices among those of triangles that are not sound: each takes the index of the first.
     pub fn join(&mut self, is_sound: &[bool]) {
-        let mut is_named = vec![false; self.mesh.positions.len()];
+        let mut is_used = vec![false; self.mesh.positions.len()];
         for (triangle, _) in self.mesh.triangles.iter().zip(is_sound).filter(|(_, sound)| !**sound) {
-            triangle.iter().for_each(|&vertex| is_named[vertex as usize] = true);
+            triangle.iter().for_each(|&vertex| is_used[vertex as usize] = true);
         }
-        let mut names: Vec<u32> = (0..self.mesh.positions.len() as u32).collect();
-        let named: Vec<u32> = names.iter().copied().filter(|&vertex| is_named[vertex as usize]).collect();
+        let mut targets: Vec<u32> = (0..self.mesh.positions.len() as u32).collect();
+        let used: Vec<u32> = targets.iter().copied().filter(|&vertex| is_used[vertex as usize]).collect();
         let positions: Vec<DVec3> =
-            named.iter().map(|&vertex| self.mesh.positions[vertex as usize].cast()).collect();
+            used.iter().map(|&vertex| self.mesh.positions[vertex as usize].cast()).collect();
         let unsound = self.mesh.triangles.iter().zip(is_sound).filter(|(_, sound)| !**sound);
-        let number = |vertex: u32| named.partition_point(|other| *other < vertex) as u32;
+        let number = |vertex: u32| used.partition_point(|other| *other < vertex) as u32;
         let triangles: Vec<[u32; 3]> = unsound.map(|(triangle, _)| triangle.map(number)).collect();
         let weld = Weld::of(&positions, &triangles);
         self.prepared.ambiguous_vertices = weld.ambiguous.len();
-        for (&vertex, first) in named.iter().zip(weld.firsts) {
-            names[vertex as usize] = named[first as usize];
-            self.prepared.joined_vertices += usize::from(names[vertex as usize] != vertex);
+        for (&vertex, first) in used.iter().zip(weld.firsts) {
+            targets[vertex as usize] = used[first as usize];
+            self.prepared.joined_vertices += usize::from(targets[vertex as usize] != vertex);
         }
         for (triangle, _) in self.mesh.triangles.iter_mut().zip(is_sound).filter(|(_, sound)| !**sound) {
-            *triangle = triangle.map(|vertex| names[vertex as usize]);
+            *triangle = triangle.map(|vertex| targets[vertex as usize]);
         }
     }
 
-    /// Turns triangles round so that two that share an edge with no third agree.
+    /// Flips triangles so that the two triangles of an edge with exactly two agree.
     pub fn make_agree(&mut self, uses: &[Use]) {
         let area = |at: usize| normal(&self.mesh.corners(at)).norm();
         let turned = agree(&self.mesh.triangles, uses, area).turned;
@@ -64,7 +64,7 @@ impl Closed {
         self.prepared.dropped_triangles += count;
     }
 
-    /// Turns parts of negative volume round.
+    /// Flips the triangles of parts with negative volume.
     pub fn turn_outward(&mut self, parts: &[u32]) {
         let mut six = vec![0.0f64; parts.len()];
         for (triangle, &part) in parts.iter().enumerate() {
@@ -89,7 +89,7 @@ pub struct Prepared {
     pub ambiguous_vertices: usize,
     /// Triangles left out because they have no area, are duplicates or are alone, and those of parts that coincide with another part.
     pub dropped_triangles: usize,
-    /// Triangles turned round to agree with their neighbours.
+    /// Triangles flipped to agree with their neighbours.
     pub turned_triangles: usize,
     /// Parts turned outward as a whole.
     pub turned_parts: usize,

@@ -5,15 +5,15 @@ use crate::geometry::check::duplicates::{self, by_vertices, rotated};
 use crate::geometry::check::edges::{edge_uses, imbalance, is_same_edge, parts_of};
 
 /// Which triangles have the same vertices as others and are removed. Of those with the same orientation the first stays. If two have
-/// opposite orientations none stays: they are a sheet folded onto itself, which encloses nothing. But where such sheets are closed
-/// themselves, the first ones stay: a solid of whose faces both sides were given.
+/// opposite orientations none stays: they are a sheet folded onto itself, which encloses nothing. But if such sheets are closed
+/// themselves, the first triangles stay: they are a solid given with both sides of its faces.
 pub(in crate::mesh_repair) fn doubled(vertices: usize, triangles: &[[u32; 3]]) -> Vec<bool> {
     let order = by_vertices(triangles);
     let mut is_out = vec![false; triangles.len()];
     let mut folded = Vec::new();
     for same in order.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() > 1) {
         same[1..].iter().for_each(|(_, number, _)| is_out[*number as usize] = true);
-        if same.iter().any(|(_, _, way)| *way != same[0].2) {
+        if same.iter().any(|(_, _, is_ascending)| *is_ascending != same[0].2) {
             folded.push(same[0].1);
         }
     }

@@ -74,7 +74,7 @@ fn loose_needles(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<bool> {
     }
     let uses = edge_uses(positions.len(), triangles);
     let edges: Vec<&[Use]> = uses.chunk_by(is_same_edge).collect();
-    let mut left: Vec<usize> = edges.iter().map(|run| run.len()).collect();
+    let mut remaining: Vec<usize> = edges.iter().map(|run| run.len()).collect();
     let mut own = vec![[0usize; 3]; triangles.len()];
     for (edge, run) in edges.iter().enumerate() {
         for &(ends, triangle) in run.iter() {
@@ -83,7 +83,7 @@ fn loose_needles(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<bool> {
     }
     let mut todo: Vec<u32> = (0..triangles.len() as u32).rev().filter(|at| is_needle[*at as usize]).collect();
     while let Some(needle) = todo.pop() {
-        let counts = own[needle as usize].map(|edge| left[edge]);
+        let counts = own[needle as usize].map(|edge| remaining[edge]);
         // Without it an edge with an even number of triangles is open, one with an odd number no longer is.
         let gained = counts.iter().filter(|count| **count % 2 == 1).count();
         if is_out[needle as usize] || gained < 2 || !counts.contains(&1) {
@@ -91,9 +91,9 @@ fn loose_needles(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<bool> {
         }
         is_out[needle as usize] = true;
         for edge in own[needle as usize] {
-            left[edge] -= 1;
+            remaining[edge] -= 1;
             // The last needle on an edge may be loose now.
-            if left[edge] == 1 {
+            if remaining[edge] == 1 {
                 todo.extend(edges[edge].iter().map(|used| used.1).filter(|at| is_needle[*at as usize]));
             }
         }
@@ -151,7 +151,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn of_doubled_bodies_one_is_left() {
+    fn of_doubled_parts_one_is_left() {
         let (one, inverted) = (cube(0.0), cube(0.0).reversed());
         let mut twice = one.clone();
         twice.triangles.extend_from_slice(&one.triangles);

@@ -7,7 +7,7 @@ pub(in crate::mesh_repair) mod faulty_cells;
 
 use std::collections::BTreeMap;
 
-use super::cut::exact::{GridEdge, around, end};
+use super::cut::exact::{GridEdge, cells_around, end};
 use super::cut::pierces::Pierces;
 use crate::geometry::{Coord, coords};
 use crate::numeric::blocks::{Mask, origin_of};
@@ -22,13 +22,13 @@ pub struct CellSet {
 impl CellSet {
     /// Whether a cell is in it.
     pub fn holds(&self, cell: Coord) -> bool {
-        let (row, bit) = within(cell);
+        let (row, bit) = bit_of(cell);
         self.blocks.get(&origin_of(cell)).is_some_and(|mask| mask[row] & bit != 0)
     }
 
     /// Adds a cell; returns whether it is new.
     pub fn add(&mut self, cell: Coord) -> bool {
-        let (row, bit) = within(cell);
+        let (row, bit) = bit_of(cell);
         let word = &mut self.blocks.entry(origin_of(cell)).or_default()[row];
         let is_new = *word & bit == 0;
         *word |= bit;
@@ -60,7 +60,7 @@ impl CellSet {
     }
 }
 
-fn within(cell: Coord) -> (usize, u64) {
+fn bit_of(cell: Coord) -> (usize, u64) {
     let [x, y, z] = cell.map(|at| (at & 7) as usize);
     (x, 1 << (y << 3 | z))
 }
@@ -108,7 +108,7 @@ pub fn is_unsound(pierces: &Pierces, inside: &impl Inside, edge: GridEdge) -> bo
 pub fn grow(set: &mut CellSet, mut added: Vec<Coord>, pierces: &Pierces, inside: &impl Inside) {
     while let Some(cell) = added.pop() {
         for edge in edges_of(cell) {
-            let cells = around(edge);
+            let cells = cells_around(edge);
             if cells.iter().all(|cell| set.holds(*cell)) || !is_unsound(pierces, inside, edge) {
                 continue;
             }

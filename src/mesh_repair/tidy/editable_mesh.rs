@@ -214,7 +214,7 @@ pub(in crate::mesh_repair) mod tests {
     }
 
     #[test]
-    fn fans_hold_whole_triangles_too_and_are_only_where_something_was_created() {
+    fn fans_hold_whole_triangles_too_and_exist_only_at_created_triangles() {
         let mut draft = draft();
         let rings = VertexRings::of(&mut draft);
         let ring = |vertex: u32| rings.fans.ring(&rings.draft.triangles, vertex);
@@ -243,7 +243,7 @@ pub(in crate::mesh_repair) mod tests {
     }
 
     #[test]
-    fn changes_keep_a_closed_manifold_and_what_is_dropped_is_dropped_alone() {
+    fn changes_keep_a_closed_manifold_and_drop_only_what_is_unused() {
         for change in [0, 1] {
             let mut draft = draft();
             let mut rings = VertexRings::of(&mut draft);

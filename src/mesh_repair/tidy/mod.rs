@@ -15,14 +15,14 @@ use crate::geometry::shape::{altitude, normal};
 use editable_mesh::{Change, VertexRings};
 
 /// Quality below which a triangle is a sliver: the 1e-4 guaranteed for a repaired mesh, with a margin.
-const LEAST: f64 = 4e-4;
+const MIN_QUALITY: f64 = 4e-4;
 /// Triangles of at least this quality are left alone.
 const GOOD: f64 = 0.05;
 /// Length up to which edges are short (cells).
 const SHORT: f64 = 1e-3;
 /// Largest displacement of a vertex in one change (cells).
-const FARTHEST: f64 = 0.5;
-/// Largest displacement of the surface where an edge flips (cells): between large triangles that meet in a ridge it would be far.
+const MAX_DISPLACEMENT: f64 = 0.5;
+/// Largest displacement of the surface where an edge flips (cells): where large triangles meet in a ridge it would be large.
 const BEVEL: f64 = 0.1;
 /// Maximum number of times a triangle is queued in a sweep.
 const TRIES: u8 = 8;
@@ -38,38 +38,38 @@ struct Rule {
     /// A change must reduce the number of slivers; else it must improve the worst triangle without adding slivers.
     by_count: bool,
     /// Largest displacement of a vertex (cells).
-    farthest: f64,
+    max_displacement: f64,
     /// Edges may be flipped, not only collapsed.
     may_flip: bool,
     /// A collapse may invert triangles.
-    may_turn: bool,
+    may_invert: bool,
     /// A flip may fold its two triangles.
     may_fold: bool,
 }
 
 /// Against slivers alone.
-const RESORT: Rule = Rule {
-    below: LEAST,
+const SLIVERS_ONLY: Rule = Rule {
+    below: MIN_QUALITY,
     by_count: true,
-    farthest: FARTHEST,
+    max_displacement: MAX_DISPLACEMENT,
     may_flip: true,
-    may_turn: false,
+    may_invert: false,
     may_fold: false,
 };
 
 /// Applied in order: almost coincident points are merged before a flip can separate them; then triangles are improved; the slivers that are
 /// left are removed by ever less careful rules.
 const RULES: [Rule; 5] = [
-    Rule { farthest: SHORT, may_flip: false, ..RESORT },
-    Rule { below: GOOD, by_count: false, ..RESORT },
-    RESORT,
-    Rule { may_turn: true, ..RESORT },
-    Rule { may_turn: true, may_fold: true, ..RESORT },
+    Rule { max_displacement: SHORT, may_flip: false, ..SLIVERS_ONLY },
+    Rule { below: GOOD, by_count: false, ..SLIVERS_ONLY },
+    SLIVERS_ONLY,
+    Rule { may_invert: true, ..SLIVERS_ONLY },
+    Rule { may_invert: true, may_fold: true, ..SLIVERS_ONLY },
 ];
 
 /// Removes slivers from the created triangles, then drops new vertices that no triangle uses; all others keep their order. The mesh must be
 /// a closed 2-manifold by index in which only created triangles use new vertices, and stays one. Returns how many created triangles are left
-/// whose smallest altitude is below [`LEAST`] of their longest edge, however short that is.
+/// whose smallest altitude is below [`MIN_QUALITY`] of their longest edge, however short that is.
 pub(super) fn tidy(draft: &mut Draft) -> usize {
     let mut tidy = Tidy::new(draft);
     for _ in 0..ROUNDS {
@@ -80,7 +80,7 @@ pub(super) fn tidy(draft: &mut Draft) -> usize {
                 }
             }
         }
-        if !tidy.created.iter().any(|&triangle| tidy.is_below(triangle, LEAST)) {
+        if !tidy.created.iter().any(|&triangle| tidy.is_below(triangle, MIN_QUALITY)) {
             break;
         }
     }
@@ -90,7 +90,7 @@ pub(super) fn tidy(draft: &mut Draft) -> usize {
 }
 
 /// Distance between the two diagonals of a quadrangle, a b and c d (cells).
-fn apart([a, b, c, d]: [DVec3; 4]) -> f64 {
+fn diagonal_distance([a, b, c, d]: [DVec3; 4]) -> f64 {
     let across = (b - a).cross(&(d - c));
     let length = across.norm();
     // Collinear diagonals have no distance, and parallel ones bound no area.
@@ -115,7 +115,7 @@ impl Score {
 
     fn count(&mut self, quality: f64) {
         self.worst = self.worst.min(quality);
-        self.slivers += usize::from(quality < LEAST);
+        self.slivers += usize::from(quality < MIN_QUALITY);
     }
 }
 
@@ -126,12 +126,12 @@ struct Outcome {
     /// Lowest quality after it, capped at [`GOOD`]: more is not worth a longer displacement.
     worst: f64,
     /// Displacement of the surface (cells).
-    far: f64,
+    displacement: f64,
 }
 
 impl Outcome {
     fn is_better_than(&self, other: &Self) -> bool {
-        self.worst > other.worst || (self.worst >= other.worst && self.far < other.far)
+        self.worst > other.worst || (self.worst >= other.worst && self.displacement < other.displacement)
     }
 }
 
@@ -141,8 +141,8 @@ struct Tidy<'a> {
     /// Created triangles, ascending; collapses may have removed some.
     created: Vec<u32>,
     /// Triangles still to be looked at, each once.
-    waiting: VecDeque<u32>,
-    is_waiting: Vec<bool>,
+    queue: VecDeque<u32>,
+    is_queued: Vec<bool>,
     /// How often each triangle was queued in this sweep.
     tries: Vec<u8>,
 }
@@ -154,8 +154,8 @@ impl<'a> Tidy<'a> {
         Self {
             created: created.map(|(triangle, _)| triangle).collect(),
             rings: VertexRings::of(draft),
-            waiting: VecDeque::new(),
-            is_waiting: vec![false; count],
+            queue: VecDeque::new(),
+            is_queued: vec![false; count],
             tries: vec![0; count],
         }
     }
@@ -168,8 +168,8 @@ impl<'a> Tidy<'a> {
             self.queue(triangle, rule);
         }
         let mut has_changed = false;
-        while let Some(triangle) = self.waiting.pop_front() {
-            self.is_waiting[triangle as usize] = false;
+        while let Some(triangle) = self.queue.pop_front() {
+            self.is_queued[triangle as usize] = false;
             if self.is_below(triangle, rule.below)
                 && let Some(change) = self.best(triangle, rule)
             {
@@ -184,17 +184,17 @@ impl<'a> Tidy<'a> {
 
     fn queue(&mut self, triangle: u32, rule: &Rule) {
         let at = triangle as usize;
-        if !self.is_waiting[at] && self.tries[at] < TRIES && self.is_below(triangle, rule.below) {
-            self.is_waiting[at] = true;
+        if !self.is_queued[at] && self.tries[at] < TRIES && self.is_below(triangle, rule.below) {
+            self.is_queued[at] = true;
             self.tries[at] += 1;
-            self.waiting.push_back(triangle);
+            self.queue.push_back(triangle);
         }
     }
 
-    /// Count of created triangles whose smallest altitude is below [`LEAST`] of their longest edge.
+    /// Count of created triangles whose smallest altitude is below [`MIN_QUALITY`] of their longest edge.
     fn slivers(&self) -> usize {
         let there = self.created.iter().filter(|&&triangle| self.rings.is_created(triangle));
-        there.filter(|&&triangle| altitude(&self.positions(triangle), 0.0) < LEAST).count()
+        there.filter(|&&triangle| altitude(&self.positions(triangle), 0.0) < MIN_QUALITY).count()
     }
 
     /// Whether a triangle was created, still exists, and is below a quality.
@@ -221,13 +221,18 @@ impl<'a> Tidy<'a> {
 
     /// The outcome of a change; none if a rule forbids it.
     fn outcome(&self, change: Change, rule: &Rule) -> Option<Outcome> {
-        let far = match change {
+        let displacement = match change {
             Change::Collapse { from, position, .. } => (position - self.rings.position(from)).norm(),
-            Change::Flip { corners, .. } => apart(corners.map(|corner| self.rings.position(corner))),
+            Change::Flip { corners, .. } => {
+                diagonal_distance(corners.map(|corner| self.rings.position(corner)))
+            }
         };
-        let farthest =
-            if let Change::Flip { .. } = change { rule.farthest.min(BEVEL) } else { rule.farthest };
-        if far > farthest {
+        let max_displacement = if let Change::Flip { .. } = change {
+            rule.max_displacement.min(BEVEL)
+        } else {
+            rule.max_displacement
+        };
+        if displacement > max_displacement {
             return None;
         }
         let [before, after] = match change {
@@ -243,7 +248,7 @@ impl<'a> Tidy<'a> {
         } else {
             after.slivers == before.slivers && after.worst > before.worst
         };
-        is_gain.then_some(Outcome { change, worst: after.worst.min(GOOD), far })
+        is_gain.then_some(Outcome { change, worst: after.worst.min(GOOD), displacement })
     }
 
     /// The triangles around a collapse, before and after it.
@@ -262,8 +267,8 @@ impl<'a> Tidy<'a> {
             let moved = |at: u32| if at == from || at == to { position } else { self.rings.position(at) };
             let new = corners.map(moved);
             // The normal of a sliver is meaningless.
-            let turns = old_quality >= LEAST && normal(&old).dot(&normal(&new)) <= 0.0;
-            if turns && !rule.may_turn {
+            let turns = old_quality >= MIN_QUALITY && normal(&old).dot(&normal(&new)) <= 0.0;
+            if turns && !rule.may_invert {
                 return None;
             }
             after.count(quality(&new));
@@ -345,7 +350,7 @@ mod tests {
         }
         let slivers = (0..draft.triangles.len())
             .filter(|&at| !matches!(draft.sources[at], Source::Whole(_)))
-            .filter(|&at| altitude(&corners(draft, at), 0.0) < LEAST);
+            .filter(|&at| altitude(&corners(draft, at), 0.0) < MIN_QUALITY);
         assert_eq!(left, slivers.count());
         left
     }
@@ -428,7 +433,7 @@ mod tests {
     }
 
     #[test]
-    fn heaps_of_points_become_one() {
+    fn clusters_of_points_become_one() {
         let first = torus(1.0);
         for (made, noise) in [(1.0, 0.0), (1.0, 1e-9), (0.7, 1e-9)] {
             let (mut draft, mut random) = (torus(1.0), Random(1));

@@ -39,7 +39,7 @@ impl Clip {
     pub fn read(file: &File, animation: &gltf::Animation) -> Result<Self, String> {
         let mut channels = Vec::new();
         for channel in animation.channels() {
-            // Extensions may leave the node out; frazil animates nodes only.
+            // Extensions may omit the node, but only nodes are animated here.
             let node = channel.target().node();
             let sampler = channel.sampler();
             let times = numbers::<1>(file, &sampler.input())?;
@@ -110,7 +110,7 @@ impl Channel {
         &self.values[row * self.width..(row + 1) * self.width]
     }
 
-    /// The value at a time; before the first key and after the last, theirs.
+    /// The value at a time; constant before the first key and after the last.
     fn at(&self, time: f64, out: &mut Vec<f64>) {
         out.clear();
         let next = self.times.partition_point(|&key| key <= time);

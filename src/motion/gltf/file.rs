@@ -40,7 +40,7 @@ impl File {
         let parsed = json::parse(&bytes).map_err(|what| Error::file(path, what))?;
         let json::Parsed { document, blob, compressed, fallbacks, instances, zeros, has_materials } = parsed;
         let folder = path.parent().unwrap_or(Path::new("."));
-        // Each on its own, so that the message can name the one at fault.
+        // One by one, so that the message can name the buffer at fault.
         let mut blob = blob;
         let buffers = document.buffers().map(|buffer| {
             let name = match buffer.source() {
@@ -198,13 +198,13 @@ impl File {
         count: usize,
         kind: DataType,
     ) -> Option<Vec<[f64; N]>> {
-        // Skips the work once readers are to stop.
+        // Skips the work after a cancel.
         if count == 0 || source::is_stopped() {
             return Some(Vec::new());
         }
         let size = kind.size();
         let stride = view.stride().unwrap_or(size * N);
-        // Overlapping rows could be any number of them.
+        // Overlapping rows would let a few bytes hold any number of elements.
         if stride < size * N {
             return None;
         }

@@ -8,14 +8,14 @@ use meshopt_rs::vertex::filter;
 use super::json::Compressed;
 
 /// Maximum bytes that one byte of compressed data expands to.
-const MOST_EXPANSION: usize = 256;
+const MAX_EXPANSION: usize = 256;
 
 /// The bytes of a view.
 ///
 /// # Errors
 /// What is wrong with the data, as part of a sentence about the view.
 pub(super) fn decode(view: &Compressed, data: &[u8]) -> Result<Vec<u8>, String> {
-    let size = view.stride.checked_mul(view.count).filter(|size| *size / MOST_EXPANSION <= data.len());
+    let size = view.stride.checked_mul(view.count).filter(|size| *size / MAX_EXPANSION <= data.len());
     let size = size.ok_or("is shorter than its count")?;
     let mut bytes = match view.mode.as_str() {
         "ATTRIBUTES" => vertices(view, data)?,

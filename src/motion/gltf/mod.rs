@@ -30,12 +30,12 @@ const SAME_POSE: f64 = 1e-3;
 const AT_END: f64 = 2e-5;
 
 /// A clip shorter than this (s) is a pose: it does not repeat.
-const SHORTEST_ROUND: f64 = 1e-3;
+const MIN_CYCLE: f64 = 1e-3;
 
 /// Which parts of a file are wanted, and when they play.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Play {
-    /// Only nodes of this name, and their descendants; `*` matches any letters. None: all.
+    /// Only nodes of this name, and their descendants; `*` matches any characters, `?` one. None: all.
     pub node: Option<String>,
     /// The clip's name; empty: the rest pose. None: the only clip, or the rest pose if there is none.
     pub clip: Option<String>,
@@ -205,7 +205,7 @@ impl Character {
 
     /// Whether the clip plays more than once.
     fn repeats(&self) -> bool {
-        self.play.repeat && self.duration() > SHORTEST_ROUND
+        self.play.repeat && self.duration() > MIN_CYCLE
     }
 
     /// The clip's own time (s) at a time of the shot.
@@ -269,15 +269,15 @@ impl Motion for Character {
     fn breaks(&self, from: f64, to: f64) -> Vec<f64> {
         let Some(clip) = &self.clip else { return Vec::new() };
         let duration = self.duration();
-        let rounds = if self.repeats() {
-            let round = |time: f64| ((time - self.play.start) / duration).floor() as i64;
-            round(from)..=round(to)
+        let cycles = if self.repeats() {
+            let cycle = |time: f64| ((time - self.play.start) / duration).floor() as i64;
+            cycle(from)..=cycle(to)
         } else {
             0..=0
         };
         let mut out = Vec::new();
-        for round in rounds {
-            let begin = self.play.start + round as f64 * duration;
+        for cycle in cycles {
+            let begin = self.play.start + cycle as f64 * duration;
             out.extend(self.kinks.iter().map(|kink| begin + kink - clip.start));
             if self.jump.is_some() {
                 out.extend([begin - JUMP, begin]);
@@ -289,7 +289,7 @@ impl Motion for Character {
         out
     }
 
-    fn keeps_its_welds(&self) -> bool {
+    fn is_welded(&self) -> bool {
         true
     }
 }
@@ -402,18 +402,18 @@ fn clip(file: &File, name: Option<&str>) -> std::result::Result<Option<Clip>, St
     Ok(Some(clip))
 }
 
-/// Names in quotes, at most a dozen.
+/// Names in quotes, at most two dozen.
 fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
-    const MOST: usize = 24;
+    const MAX_LISTED: usize = 24;
     let names: Vec<&str> = names.collect();
-    let mut text: Vec<String> = names.iter().take(MOST).map(|name| format!("\"{name}\"")).collect();
-    if names.len() > MOST {
-        text.push(format!("{} more", names.len() - MOST));
+    let mut text: Vec<String> = names.iter().take(MAX_LISTED).map(|name| format!("\"{name}\"")).collect();
+    if names.len() > MAX_LISTED {
+        text.push(format!("{} more", names.len() - MAX_LISTED));
     }
     text.join(", ")
 }
 
-/// Whether a name matches a pattern in which `*` stands for any letters and `?` for one.
+/// Whether a name matches a pattern in which `*` stands for any characters and `?` for one.
 fn matches(pattern: &str, name: &str) -> bool {
     let (pattern, name): (Vec<char>, Vec<char>) = (pattern.chars().collect(), name.chars().collect());
     let (mut p, mut n, mut star) = (0, 0, None);
@@ -423,9 +423,9 @@ fn matches(pattern: &str, name: &str) -> bool {
                 star = Some((p, n));
                 p += 1;
             }
-            Some(&letter) if letter == '?' || letter == name[n] => (p, n) = (p + 1, n + 1),
+            Some(&character) if character == '?' || character == name[n] => (p, n) = (p + 1, n + 1),
             _ => match star {
-                // The last star takes one more letter.
+                // The last star takes one more character.
                 Some((at, taken)) => {
                     star = Some((at, taken + 1));
                     (p, n) = (at + 1, taken + 1);
@@ -434,7 +434,7 @@ fn matches(pattern: &str, name: &str) -> bool {
             },
         }
     }
-    pattern[p..].iter().all(|&letter| letter == '*')
+    pattern[p..].iter().all(|&character| character == '*')
 }
 
 #[cfg(test)]
@@ -443,7 +443,7 @@ mod tests {
 
     #[test]
     fn stars_stand_for_any_letters() {
-        for (pattern, name, fits) in [
+        for (pattern, name, does_match) in [
             ("hero*", "hero_body", true),
             ("*body", "hero_body", true),
             ("h*o*y", "hero_body", true),
@@ -453,7 +453,7 @@ mod tests {
             ("?", "", false),
             ("a*b", "a*bc", false),
         ] {
-            assert_eq!(matches(pattern, name), fits, "{pattern} {name}");
+            assert_eq!(matches(pattern, name), does_match, "{pattern} {name}");
         }
     }
 }

@@ -18,7 +18,7 @@ struct Skin {
 }
 
 /// Maximum triangles, or vertices, that copies of a mesh may have.
-const MOST_COPIED: usize = 1 << 25;
+const MAX_COPIED: usize = 1 << 25;
 
 /// Vertices of one node that move alike: all by joints of one skin, or all by the node.
 #[derive(Clone)]
@@ -54,12 +54,12 @@ pub(super) struct Vertices {
     parts: Vec<Part>,
     pub triangles: Vec<[u32; 3]>,
     pub count: usize,
-    pub drawn: Sheet,
+    pub drawn: FileVertices,
 }
 
 /// The vertices in the order of the file: primitive by primitive of each node, in the accessor's order.
 #[derive(Default)]
-pub(super) struct Sheet {
+pub(super) struct FileVertices {
     /// For each, the vertex that moves like it.
     pub vertices: Vec<u32>,
     /// The same triangles as `Vertices` has, in the same order, over these vertices.
@@ -136,9 +136,9 @@ impl Vertices {
     fn copy_last(&mut self, copies: &[Local], begin: [usize; 3]) -> Result<(), String> {
         let original = self.parts.last().expect("a part to copy").clone();
         let [triangles, corners] = [original.triangles.len(), self.drawn.vertices.len() - begin[1]];
-        if triangles.max(corners).saturating_mul(copies.len()) > MOST_COPIED {
+        if triangles.max(corners).saturating_mul(copies.len()) > MAX_COPIED {
             return Err(format!(
-                "its {} instances of {triangles} triangles are more than {MOST_COPIED} triangles",
+                "its {} instances of {triangles} triangles are more than {MAX_COPIED} triangles",
                 copies.len() + 1
             ));
         }
@@ -292,8 +292,8 @@ impl Part {
     }
 }
 
-impl Sheet {
-    /// Adds a copy of some vertices and of the triangles over them; `shift` leads from the index of a moving vertex to that of its copy.
+impl FileVertices {
+    /// Adds a copy of some vertices and of the triangles over them; `shift` is the index of a moving vertex' copy minus its own.
     fn copy(&mut self, vertices: Range<usize>, triangles: Range<usize>, shift: u32) {
         let by = (self.vertices.len() - vertices.start) as u32;
         for at in triangles {
@@ -315,8 +315,8 @@ impl Sheet {
         numbers: &[u32],
         triangles: &[[u32; 3]],
     ) -> Result<(), String> {
-        let positions = primitive.get(&Semantic::TexCoords(0));
-        let named = [primitive.get(&Semantic::Positions), positions.clone()];
+        let uvs = primitive.get(&Semantic::TexCoords(0));
+        let named = [primitive.get(&Semantic::Positions), uvs.clone()];
         let accessors: Vec<usize> = named.iter().flatten().map(gltf::Accessor::index).collect();
         let is_same = |(others, begin): &&(Vec<usize>, usize)| {
             *others == accessors && self.vertices.get(*begin..*begin + numbers.len()) == Some(numbers)
@@ -326,7 +326,7 @@ impl Sheet {
             None => {
                 let begin = self.vertices.len();
                 self.vertices.extend_from_slice(numbers);
-                self.add_positions(file, positions, begin)?;
+                self.add_uvs(file, uvs, begin)?;
                 self.shared.push((accessors, begin));
                 begin
             }
@@ -336,27 +336,22 @@ impl Sheet {
     }
 
     /// Texture coordinates of the vertices from `begin` on; in glTF v points down from the top.
-    fn add_positions(
-        &mut self,
-        file: &File,
-        positions: Option<gltf::Accessor>,
-        begin: usize,
-    ) -> Result<(), String> {
+    fn add_uvs(&mut self, file: &File, accessor: Option<gltf::Accessor>, begin: usize) -> Result<(), String> {
         let count = self.vertices.len() - begin;
-        let Some(positions) = positions else {
+        let Some(accessor) = accessor else {
             if let Some(uvs) = &mut self.uvs {
                 uvs.coordinates.resize(self.vertices.len(), [0.0; 2]);
                 uvs.missing += count;
             }
             return Ok(());
         };
-        let positions = file.rows::<2>(&positions)?;
-        if positions.len() != count {
+        let coordinates = file.rows::<2>(&accessor)?;
+        if coordinates.len() != count {
             return Err("has not texture coordinates for every vertex".into());
         }
         let before = || Uvs { coordinates: vec![[0.0; 2]; begin], corners: None, missing: begin };
         let uvs = self.uvs.get_or_insert_with(before);
-        uvs.coordinates.extend(positions.into_iter().map(|[u, v]| [u, 1.0 - v]));
+        uvs.coordinates.extend(coordinates.into_iter().map(|[u, v]| [u, 1.0 - v]));
         Ok(())
     }
 }

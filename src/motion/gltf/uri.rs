@@ -9,8 +9,8 @@ use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use crate::error::Result;
 use crate::io::files::source;
 
-/// Or why a buffer cannot be read, to follow its name.
-pub(super) type Told<T> = std::result::Result<T, String>;
+/// A value, or why the buffer cannot be read: words that follow the buffer's name.
+pub(super) type OrReason<T> = std::result::Result<T, String>;
 
 /// Reads a buffer. A file must lie in the model's folder or below: a model is data, and may not read other files.
 ///
@@ -20,11 +20,11 @@ pub(super) fn read(
     buffer: &gltf::Buffer,
     folder: &Path,
     blob: &mut Option<Vec<u8>>,
-) -> Result<Told<Vec<u8>>> {
+) -> Result<OrReason<Vec<u8>>> {
     let uri = match buffer.source() {
         gltf::buffer::Source::Bin => return Ok(blob.take().ok_or_else(|| "is missing".to_string())),
         gltf::buffer::Source::Uri(uri) if uri.starts_with("data:") => {
-            return Ok(written_out(uri).ok_or_else(|| "is damaged".into()));
+            return Ok(embedded(uri).ok_or_else(|| "is damaged".into()));
         }
         gltf::buffer::Source::Uri(uri) => uri,
     };
@@ -50,7 +50,7 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 );
 
 /// The bytes of a buffer embedded in its URI; `None` if they are not base64.
-fn written_out(uri: &str) -> Option<Vec<u8>> {
+fn embedded(uri: &str) -> Option<Vec<u8>> {
     let mut bytes = BASE64.decode(uri.split_once(";base64,")?.1).ok()?;
     // Padded like the chunk of a .glb.
     bytes.resize(bytes.len().next_multiple_of(4), 0);
@@ -84,7 +84,7 @@ mod tests {
         let cases: [(&str, &[u8]); 5] =
             [("", b""), ("Zg==", b"f"), ("Zm8=", b"fo"), ("Zm9v", b"foo"), ("Zm9vYmFyZm8", b"foobarfo")];
         for (text, bytes) in cases {
-            let read = written_out(&format!("data:application/octet-stream;base64,{text}")).unwrap();
+            let read = embedded(&format!("data:application/octet-stream;base64,{text}")).unwrap();
             assert_eq!(&read[..bytes.len()], bytes, "{text}");
             assert!(
                 read.len().is_multiple_of(4) && read[bytes.len()..].iter().all(|&byte| byte == 0),
@@ -93,9 +93,9 @@ mod tests {
         }
         // One letter too many, non-zero unused bits, signs of another alphabet, a line end, padding inside.
         for wrong in ["Z", "Zm9vY", "Zh==", "Zm9=", "Zm-v", "Zm9v\n", "Zg==Zm9v", "Zg==="] {
-            assert_eq!(written_out(&format!("data:;base64,{wrong}")), None, "{wrong}");
+            assert_eq!(embedded(&format!("data:;base64,{wrong}")), None, "{wrong}");
         }
-        assert_eq!(written_out("data:text/plain,Zm9v"), None);
+        assert_eq!(embedded("data:text/plain,Zm9v"), None);
     }
 
     #[test]

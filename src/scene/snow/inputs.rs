@@ -10,7 +10,7 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::check::orientation::{Closing, Orientation};
 use crate::geometry::mesh::weld::Weld;
-use crate::geometry::mesh::{BY_KEY, farthest, too_far as far_mesh};
+use crate::geometry::mesh::{BY_KEY, farthest, too_far_warning};
 use crate::geometry::{DVec3, TriMesh};
 use crate::io::files::sequence::Pattern;
 use crate::io::mesh;
@@ -91,7 +91,7 @@ impl Inputs {
         }
         let meshes = || snow.files().filter_map(|(key, path)| Some((&**path, source.mesh(key)?)));
         warnings.extend(meshes().filter_map(|(path, mesh)| {
-            far_mesh(&path.display().to_string(), mesh.farthest(), 1.0, snow.cell, ORIGIN_ADVICE)
+            too_far_warning(&path.display().to_string(), mesh.farthest(), 1.0, snow.cell, ORIGIN_ADVICE)
         }));
         warnings.extend(meshes().filter_map(|(path, mesh)| ambiguous_corners(path, mesh)));
         let start = scene.shot.time(scene.shot.frames.first);
@@ -122,7 +122,7 @@ impl Inputs {
         let initial_grains = InitialGrains::of(scene, snow.cell, &input_hashes, &mut warnings)?;
         let wind = match wind::wind_file(scene) {
             None => None,
-            Some(path) => Some(input_hashes.around(path, || wind::wind(path))?),
+            Some(path) => Some(input_hashes.read_with(path, || wind::wind(path))?),
         };
         warnings.iter().for_each(|warning| log::warn!("{warning}"));
         Ok(Self { snow, source, statics, bodies, initial_grains, wind, input_hashes, warnings })
@@ -326,7 +326,7 @@ fn ambiguous_corners(path: &Path, mesh: &TriMesh) -> Option<String> {
 }
 
 fn layer_grid(path: &Path, cell: f64, input_hashes: &InputHashes) -> Result<FloatGrid> {
-    let grid = input_hashes.around(path, || file::read_named(path, None))?;
+    let grid = input_hashes.read_with(path, || file::read_named(path, None))?;
     if grid.class() != GridClass::LevelSet {
         return Err(Error::file(path, format!("grid \"{}\" is not a level set", grid.name())));
     }
@@ -372,7 +372,7 @@ fn motion(
             let first = (f64::from(scene.shot.frames.first) - object.offset).floor() as i32;
             let last = (f64::from(scene.shot.frames.last) - object.offset).ceil() as i32;
             let origin = object.space.origin;
-            Box::new(MeshSequence::open_seen(
+            Box::new(MeshSequence::open_with_hashes(
                 pattern,
                 first,
                 last,
@@ -389,7 +389,7 @@ fn motion(
     let space = if is_gltf(&object.file) { object.space } else { object.space.without_origin() };
     pose.iter_mut().for_each(|position| *position -= space.origin);
     let name = object.file.display().to_string();
-    warnings.extend(far_mesh(&name, farthest(pose.iter()), space.scale, scene.snow()?.cell, BY_KEY));
+    warnings.extend(too_far_warning(&name, farthest(pose.iter()), space.scale, scene.snow()?.cell, BY_KEY));
     if scene.output.objects_usd || scene.output.objects_ply {
         let missing = own.drawn().uvs.map_or(0, |uvs| uvs.missing);
         warnings.extend((missing > 0).then(|| missing_uvs(&name, missing)));
@@ -405,7 +405,7 @@ fn character(scene: &Scene, object: &Object, input_hashes: &InputHashes) -> Resu
         start: (f64::from(scene.shot.frames.first) + object.offset) / scene.shot.fps,
     };
     let character = Character::open(&object.file, play)?;
-    input_hashes.note(&object.file, character.content().to_string())?;
+    input_hashes.record(&object.file, character.content().to_string())?;
     if let Some(jump) = character.jump() {
         let metres = jump * object.space.scale;
         log::warn!(

@@ -4,7 +4,7 @@ use super::empty_removed;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::numeric::blocks::{Block, BlockEdit, VOXELS};
-use crate::vdb::{FloatGrid, Leaf, MetaValue, Ready};
+use crate::vdb::{FloatGrid, Leaf, MetaValue, PreparedBlocks};
 
 /// Metadata of `surface`: the snow's volume (m3), exactly as the layer computes it.
 const VOLUME: &str = "volume_m3";
@@ -104,7 +104,7 @@ impl Grids {
     pub fn apply(&mut self, ctx: &Context, changes: &Changes) -> Result<()> {
         // All memory is allocated before any change is applied.
         let edits = changes.edits().into_iter();
-        let ready = edits.map(|edits| Ready::new(ctx, edits)).collect::<Result<Vec<_>>>()?;
+        let ready = edits.map(|edits| PreparedBlocks::new(ctx, edits)).collect::<Result<Vec<_>>>()?;
         self.list_mut().into_iter().zip(ready).try_for_each(|(grid, ready)| grid.put(ready))?;
         self.surface.set_metadata(VOLUME, MetaValue::Double(changes.volume))
     }

@@ -153,8 +153,8 @@ impl Grains {
     }
 
     /// Unpacked size (bytes) of a saved state; 0 if it is invalid.
-    pub fn unpacked(bytes: &[u8]) -> u64 {
-        state::unpacked(bytes)
+    pub fn unpacked_size(bytes: &[u8]) -> u64 {
+        state::unpacked_size(bytes)
     }
 
     /// The exact state as bytes, the same for any number of threads.

@@ -133,8 +133,8 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
 }
 
 /// Unpacked size (bytes) of a state; 0 if it is invalid.
-pub fn unpacked(packed: &[u8]) -> u64 {
-    packed::unpacked(packed, MAGIC, NOUN)
+pub fn unpacked_size(packed: &[u8]) -> u64 {
+    packed::unpacked_size(packed, MAGIC, NOUN)
 }
 
 fn wrong(what: impl Into<String>) -> Error {

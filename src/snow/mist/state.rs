@@ -20,8 +20,8 @@ pub fn save(mist: &Mist) -> Vec<u8> {
 }
 
 /// Unpacked size (bytes); 0 if the bytes are not a state.
-pub fn unpacked(bytes: &[u8]) -> u64 {
-    packed::unpacked(bytes, MAGIC, NOUN)
+pub fn unpacked_size(bytes: &[u8]) -> u64 {
+    packed::unpacked_size(bytes, MAGIC, NOUN)
 }
 
 /// Loads a state into mist that has none yet.

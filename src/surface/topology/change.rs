@@ -8,11 +8,11 @@ use crate::context::Context;
 use crate::distance::lattice::Lattice;
 use crate::error::Result;
 use crate::geometry::DVec3;
-use crate::geometry::check::topology::around;
+use crate::geometry::check::topology::neighbour_sums;
 use crate::geometry::coords::{cell_of, cells_at, plus};
 use crate::geometry::mesh::compact;
 use crate::geometry::shape::normal;
-use crate::mesh_repair::{CellSet, Pierces, Rebuilt, Shape, Source, ladder, overlaps};
+use crate::mesh_repair::{CellSet, Pierces, Rebuilt, Shape, Source, add_overlaps, rebuild_by_levels};
 use crate::surface::level_set::band::Distances;
 use crate::surface::level_set::implicit::Implicit;
 use crate::surface::level_set::sampler::Sampler;
@@ -121,7 +121,7 @@ impl Change {
     /// stayed, 0 if there are none.
     pub(in crate::surface) fn carried_shares(&self, values: &[f32]) -> Vec<f32> {
         let old = |vertex: u32| self.origins[vertex as usize].map(|at| values[at as usize]);
-        let sums: Vec<(f32, u32)> = around(self.origins.len(), &self.triangles, old);
+        let sums: Vec<(f32, u32)> = neighbour_sums(self.origins.len(), &self.triangles, old);
         let mean = |(vertex, (sum, count)): (u32, (f32, u32))| {
             old(vertex).unwrap_or(if count > 0 { (sum / count as f32).clamp(0.0, 1.0) } else { 0.0 })
         };
@@ -182,7 +182,8 @@ pub fn rebuild(
     for node in gamma.nodes_that_changed_sides() {
         cells_at(node).into_iter().for_each(|cell| _ = set.add(cell));
     }
-    let rebuilt = ctx.phase("rebuild", || ladder(ctx, &shape, (&in_cells, &lattice), &set, &gamma))?;
+    let rebuilt =
+        ctx.phase("rebuild", || rebuild_by_levels(ctx, &shape, (&in_cells, &lattice), &set, &gamma))?;
     let (flagged_cells, iterations) = (flagged.count(), gamma.iterations);
     Ok(Some(Change { flagged_cells, iterations, ..Change::of(mesh, rebuilt, &lattice) }))
 }
@@ -273,7 +274,7 @@ fn cells_to_rebuild(mesh: &FlaggedMesh<'_>, shape: &Shape, lattice: &Lattice) ->
     for position in mesh.uncovered {
         set.add(plus(cell_of(position), lattice.origin.map(|at| -at)));
     }
-    overlaps(shape, MIN_OVERLAP, &mut set);
+    add_overlaps(shape, MIN_OVERLAP, &mut set);
     set
 }
 

@@ -4,7 +4,7 @@ use super::change::Change;
 use super::particle_count::{Bounds, ParticleCountTest, are_inside, seen_from};
 use crate::geometry::DVec3;
 use crate::geometry::check::topology;
-use crate::geometry::check::topology::bodies;
+use crate::geometry::check::topology::components;
 use crate::geometry::mesh::{compact, drop_marked};
 use crate::geometry::shape::six_volumes;
 
@@ -18,7 +18,7 @@ impl Change {
         }
         let (mut parts, mut bounds): (Vec<Vec<u32>>, Vec<Bounds>) = Default::default();
         let mut hollows: Vec<Vec<u32>> = Vec::new();
-        for part in bodies(&self.triangles) {
+        for part in components(&self.triangles) {
             match self.bounds(&part) {
                 Some(own) => {
                     parts.push(part);
@@ -145,7 +145,7 @@ mod tests {
         assert!(hollow.len() < LEAST && ball.len() >= LEAST, "{} and {}", hollow.len(), ball.len());
         let particles = numbered([ball, hollow].concat());
         let mesh = own_surface(&ctx, &particles.positions);
-        assert_eq!(bodies(&mesh.triangles).len(), 3);
+        assert_eq!(components(&mesh.triangles).len(), 3);
         for every in [false, true] {
             let params = Params { rebuild: true, every, min_drop: LEAST, ..Params::for_spacing(1.0) };
             let mut tracker = Tracker::new(&ctx, params, &mesh, &particles).unwrap();
@@ -156,7 +156,7 @@ mod tests {
                 let left = tracker.vertices().iter().filter(|position| position.x < -10.0).count();
                 assert!(left == 0, "{left} vertices after step {step}, every = {every}");
             }
-            assert!(specks == 1 && bodies(tracker.triangles()).len() == 1, "{specks}, every = {every}");
+            assert!(specks == 1 && components(tracker.triangles()).len() == 1, "{specks}, every = {every}");
         }
     }
 }

@@ -21,7 +21,7 @@ use super::particle_count::{Bounds, is_within};
 use crate::context::Context;
 use crate::distance::lattice::Lattice;
 use crate::error::Result;
-use crate::geometry::check::topology::{bodies, parts};
+use crate::geometry::check::topology::{components, parts};
 use crate::geometry::coords::{around, between, cell_of, cells_at, is_between, nodes_of, plus};
 use crate::geometry::shape::{longest_first, six_volumes};
 use crate::geometry::{Coord, DVec3};
@@ -227,7 +227,7 @@ impl Compared<'_> {
             return Ok(());
         }
         let mut sampler = Sampler::new(self.distances);
-        for part in bodies(triangles) {
+        for part in components(triangles) {
             ctx.check()?;
             let corners = || part.iter().map(move |triangle| self.corners(&triangles[*triangle as usize]));
             let Some([first, ..]) = corners().next() else { continue };
@@ -377,7 +377,7 @@ mod tests {
             let triangles = part.iter().map(|triangle| whole.triangles[*triangle as usize]).collect();
             TriMesh { positions: whole.positions.clone(), triangles }.without_unused()
         };
-        let all: Vec<TriMesh> = bodies(&whole.triangles).into_iter().map(of_part).collect();
+        let all: Vec<TriMesh> = components(&whole.triangles).into_iter().map(of_part).collect();
         let outer = all.iter().max_by(|a, b| a.volume().total_cmp(&b.volume())).unwrap();
         let bubble = outer.volume() - whole.volume();
         assert!(all.len() == 2 && bubble > 100.0, "{} parts, {bubble} m3", all.len());

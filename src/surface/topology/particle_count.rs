@@ -39,7 +39,7 @@ impl ParticleCountTest<'_> {
         let mut counts =
             count(parts, self.positions, &vec![self.min_count; parts.len()], |part, position| {
                 let tree = trees[part].get_or_insert_with(|| Bvh::new(&mesh(part)));
-                tree.surrounding(position - parts[part][0], ASLANT) > 0
+                tree.winding_number(position - parts[part][0], ASLANT) > 0
             });
         let limits = |count: &usize| if *count == 0 { 0 } else { self.min_count - count };
         let limits: Vec<usize> = counts.iter().map(limits).collect();
@@ -54,7 +54,7 @@ impl ParticleCountTest<'_> {
             let seen = position - parts[part][0];
             let surface = surfaces[part].get_or_insert_with(|| NearestTree::new(&mesh(part)));
             let is_near = surface.nearest(seen).is_some_and(|nearest| nearest.distance <= margin);
-            is_near && trees[part].as_ref().is_some_and(|tree| tree.surrounding(seen, ASLANT) <= 0)
+            is_near && trees[part].as_ref().is_some_and(|tree| tree.winding_number(seen, ASLANT) <= 0)
         });
         counts.iter_mut().zip(beside).for_each(|(count, beside)| *count += beside);
         counts
@@ -151,7 +151,7 @@ pub fn are_inside(positions: &[DVec3], parts: &[Bounds], mesh: impl Fn(usize) ->
         for (position, is_inside) in positions.iter().zip(&mut are) {
             if !*is_inside && is_within(bounds, position) {
                 let tree = tree.get_or_insert_with(|| Bvh::new(&mesh(part)));
-                *is_inside = tree.surrounding(position - bounds[0], ASLANT) > 0;
+                *is_inside = tree.winding_number(position - bounds[0], ASLANT) > 0;
             }
         }
     }

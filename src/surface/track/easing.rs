@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::check::deviation::NearestTree;
-use crate::geometry::check::topology::{around, bodies};
+use crate::geometry::check::topology::{components, neighbour_sums};
 use crate::geometry::mesh::compact;
 use crate::geometry::{DVec3, TriMesh, Vec3};
 use crate::mesh_repair::{Source, weights};
@@ -226,7 +226,7 @@ impl Patch {
     /// belong to another surface, and are left out.
     fn positions_at_jumps(&self, begin: &[DVec3], made: Vec<DVec3>, [near, longest]: [f64; 2]) -> Vec<DVec3> {
         let mut part_of = vec![0; self.triangles.len()];
-        let parts = bodies(&self.triangles);
+        let parts = components(&self.triangles);
         for (part, triangles) in parts.iter().enumerate() {
             triangles.iter().for_each(|triangle| part_of[*triangle as usize] = part);
         }
@@ -247,8 +247,9 @@ impl Patch {
     /// Gives removed vertices that were not pulled the mean displacement of their neighbours, several times; vertices that stay have none.
     fn spread(&self, displacements: &mut [DVec3], is_pulled: &[bool]) {
         for _ in 0..SPREAD {
-            let sums =
-                around(displacements.len(), &self.triangles, |vertex| Some(displacements[vertex as usize]));
+            let sums = neighbour_sums(displacements.len(), &self.triangles, |vertex| {
+                Some(displacements[vertex as usize])
+            });
             for (at, (sum, count)) in sums.into_iter().enumerate() {
                 if self.is_loose[at] && !is_pulled[at] && count > 0 {
                     displacements[at] = sum / f64::from(count);

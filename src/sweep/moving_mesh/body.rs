@@ -88,7 +88,7 @@ impl Body {
         let mut pose = Vec::new();
         motion.pose(time, &mut pose)?;
         let triangles = hash_of(motion.triangles());
-        let exact = if motion.keeps_its_welds() {
+        let exact = if motion.is_welded() {
             (0..pose.len() as u32).collect()
         } else {
             coincident(pose.iter().copied())
@@ -410,7 +410,7 @@ impl Shape {
         let own = motion.triangles();
         let (mut boundary, mut weld) =
             (Boundary::default(), Weld { firsts: exact.clone(), ..Weld::default() });
-        if !motion.keeps_its_welds() && Topology::new(own, pose.len(), &exact, false).has_lone_triangles() {
+        if !motion.is_welded() && Topology::new(own, pose.len(), &exact, false).has_lone_triangles() {
             boundary = Boundary::of(own, &exact);
             weld = welded(motion, time, &exact, &boundary)?;
         }

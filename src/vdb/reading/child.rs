@@ -1,4 +1,5 @@
-//! The process that decodes a foreign file: it limits itself, reads the file and leaves a parcel in the file that is its input.
+//! The process that decodes a foreign file: it limits its own resources, reads the file and writes a parcel into the file that is its
+//! standard input.
 
 use std::ffi::OsString;
 use std::fs::File;
@@ -32,7 +33,7 @@ pub(in crate::vdb) enum Wanted<'a> {
 }
 
 impl<'a> Wanted<'a> {
-    /// Encoded as two arguments.
+    /// As two arguments.
     pub(in crate::vdb) fn arguments(&self) -> [String; 2] {
         let (kind, name) = match self {
             Self::Infos => ("infos", None),
@@ -45,7 +46,7 @@ impl<'a> Wanted<'a> {
         [kind.into(), name.map(|name| format!("={name}")).unwrap_or_default()]
     }
 
-    /// From these arguments.
+    /// From two arguments.
     fn of(kind: &str, name: &'a str) -> Option<Self> {
         let named = name.strip_prefix('=');
         Some(match kind {
@@ -100,7 +101,7 @@ pub fn serve(arguments: impl Iterator<Item = OsString>) -> Option<u8> {
 }
 
 /// Address space of a thread: its stack. OpenVDB's helpers start one thread per core.
-const SPACE_OF_A_THREAD: u64 = 16 << 20;
+const THREAD_STACK: u64 = 16 << 20;
 
 fn limit(limits: Limits) -> std::io::Result<()> {
     // No decoding process outlives the one that started it.
@@ -108,12 +109,12 @@ fn limit(limits: Limits) -> std::io::Result<()> {
     let own = std::fs::read_to_string("/proc/self/statm")?;
     let pages: u64 = own.split(' ').next().and_then(|pages| pages.parse().ok()).unwrap_or(0);
     let threads = std::thread::available_parallelism().map_or(1, |count| count.get() as u64);
-    let own = pages * rustix::param::page_size() as u64 + threads * SPACE_OF_A_THREAD;
+    let own = pages * rustix::param::page_size() as u64 + threads * THREAD_STACK;
     let space = own.saturating_add(limits.memory);
-    for (resource, most) in [(Resource::As, space), (Resource::Cpu, limits.seconds), (Resource::Core, 0)] {
-        let there = getrlimit(resource).maximum;
-        let most = Some(there.map_or(most, |there| there.min(most)));
-        setrlimit(resource, Rlimit { current: most, maximum: there })?;
+    for (resource, bound) in [(Resource::As, space), (Resource::Cpu, limits.seconds), (Resource::Core, 0)] {
+        let hard_limit = getrlimit(resource).maximum;
+        let bound = Some(hard_limit.map_or(bound, |hard_limit| hard_limit.min(bound)));
+        setrlimit(resource, Rlimit { current: bound, maximum: hard_limit })?;
     }
     Ok(())
 }

@@ -31,7 +31,7 @@ enum Kinds {
 
 impl Kinds {
     /// Their name in messages.
-    fn words(self) -> &'static str {
+    fn description(self) -> &'static str {
         match self {
             Self::Floats => "floats",
             Self::FloatsAndVectors => "floats or vectors of floats",
@@ -40,7 +40,7 @@ impl Kinds {
     }
 
     /// Whether a grid is one of them.
-    fn take(self, header: &GridInfo) -> bool {
+    fn accepts(self, header: &GridInfo) -> bool {
         let types: &[&str] = match self {
             Self::Floats => &[FLOAT_TYPE],
             Self::FloatsAndVectors => &[FLOAT_TYPE, VECTOR_TYPE],
@@ -65,7 +65,7 @@ fn kind_of(header: &GridInfo) -> &str {
         ("Tree_ptdataidx", "points"),
     ];
     let found = known.iter().find(|(start, _)| header.value_type.starts_with(start));
-    found.map_or(header.value_type.as_str(), |(_, words)| words)
+    found.map_or(header.value_type.as_str(), |(_, description)| description)
 }
 
 /// A result whose error message is appended to the file's name.
@@ -120,7 +120,7 @@ pub(in crate::vdb) fn read(path: &Path) -> Result<Vec<FloatGrid>> {
             return Err("the .vdb file holds no grid".to_string());
         }
         let load = |at| {
-            let chosen = nth(headers.clone(), at).ok_or(ASTRAY)?;
+            let chosen = nth(headers.clone(), at).ok_or(WRONG_TYPE)?;
             floats(load(&mut source, &chosen, Kinds::Floats)?)
         };
         (0..headers.len()).map(load).collect()
@@ -154,23 +154,23 @@ pub(in crate::vdb) fn read_points(path: &Path, name: Option<&str>) -> Result<(Po
     let mut source = source(path)?;
     let read = choose(&source, name, Kinds::Points).and_then(|chosen| {
         let grid = found(&mut source, &chosen, Kinds::Points)?.points;
-        if grid.is_null() { Err(ASTRAY.to_string()) } else { point_arrays::of_grid(&grid) }
+        if grid.is_null() { Err(WRONG_TYPE.to_string()) } else { point_arrays::of_grid(&grid) }
     });
     read.map_err(|what| Error::file(path, what))
 }
 
 /// As [`crate::vdb::file::from_bytes`]; the error message is appended to the name of the bytes.
 pub(in crate::vdb) fn from_bytes(bytes: &[u8], name: Option<&str>) -> Decoded<FloatGrid> {
-    named(whole(bytes)?, name, Kinds::Floats).and_then(floats)
+    named(checked(bytes)?, name, Kinds::Floats).and_then(floats)
 }
 
 /// As [`crate::vdb::file::any_from_bytes`]; the error message is appended to the name of the bytes.
 pub(in crate::vdb) fn any_from_bytes(bytes: &[u8], name: Option<&str>) -> Decoded<AnyGrid> {
-    named(whole(bytes)?, name, Kinds::FloatsAndVectors)
+    named(checked(bytes)?, name, Kinds::FloatsAndVectors)
 }
 
 /// The grids in bytes whose structure has been checked.
-fn whole(bytes: &[u8]) -> Decoded<Source<'static>> {
+fn checked(bytes: &[u8]) -> Decoded<Source<'static>> {
     layout::read(Cursor::new(bytes)).map_err(|fault| match fault {
         Fault::Io(error) => error.to_string(),
         Fault::Content(what) => what,
@@ -229,29 +229,29 @@ fn nth(mut headers: Vec<GridInfo>, at: usize) -> Option<Chosen> {
 fn choose(source: &Source<'_>, name: Option<&str>, kinds: Kinds) -> Decoded<Chosen> {
     let headers = headers(source)?;
     let first = |wanted: &dyn Fn(&GridInfo) -> bool| headers.iter().position(wanted);
-    let floats = |header: &GridInfo| kinds != Kinds::Points && Kinds::Floats.take(header);
+    let floats = |header: &GridInfo| kinds != Kinds::Points && Kinds::Floats.accepts(header);
     let found = match name {
         Some(name) => first(&|header| header.name == name),
         None => first(&|header| floats(header) && header.class == "level set")
             .or_else(|| first(&floats))
-            .or_else(|| first(&|header| kinds.take(header))),
+            .or_else(|| first(&|header| kinds.accepts(header))),
     };
     match found {
-        Some(at) => nth(headers, at).ok_or_else(|| ASTRAY.to_string()),
+        Some(at) => nth(headers, at).ok_or_else(|| WRONG_TYPE.to_string()),
         None => {
             let list: Vec<String> =
                 headers.iter().map(|header| format!("\"{}\" ({})", header.name, kind_of(header))).collect();
-            let wanted =
-                name.map_or(format!("no grid of {}", kinds.words()), |name| format!("no grid \"{name}\""));
-            let there = if list.is_empty() { "no grid at all".to_string() } else { list.join(", ") };
-            Err(format!("{wanted} in the file, which holds {there}"))
+            let wanted = name
+                .map_or(format!("no grid of {}", kinds.description()), |name| format!("no grid \"{name}\""));
+            let held = if list.is_empty() { "no grid at all".to_string() } else { list.join(", ") };
+            Err(format!("{wanted} in the file, which holds {held}"))
         }
     }
 }
 
 /// A grid of a file.
 fn load(source: &mut Source<'_>, chosen: &Chosen, kinds: Kinds) -> Decoded<AnyGrid> {
-    let grid = AnyGrid::of(found(source, chosen, kinds)?).ok_or(ASTRAY)?;
+    let grid = AnyGrid::of(found(source, chosen, kinds)?).ok_or(WRONG_TYPE)?;
     if grid.is_finite().map_err(|error| error.to_string())? {
         return Ok(grid);
     }
@@ -260,8 +260,8 @@ fn load(source: &mut Source<'_>, chosen: &Chosen, kinds: Kinds) -> Decoded<AnyGr
 
 /// A grid of a file, as OpenVDB reads it.
 fn found(source: &mut Source<'_>, (at, header, unique): &Chosen, kinds: Kinds) -> Decoded<ffi::Found> {
-    if !kinds.take(header) {
-        let (name, kind, wanted) = (&header.name, kind_of(header), kinds.words());
+    if !kinds.accepts(header) {
+        let (name, kind, wanted) = (&header.name, kind_of(header), kinds.description());
         return Err(format!("grid \"{name}\" holds {kind}, but {wanted} are needed"));
     }
     let found = match source {
@@ -272,8 +272,8 @@ fn found(source: &mut Source<'_>, (at, header, unique): &Chosen, kinds: Kinds) -
 }
 
 /// The error for a grid whose type differs from the one that the file states.
-const ASTRAY: &str = "the .vdb file is damaged: a grid is not of the type that the file says";
+const WRONG_TYPE: &str = "the .vdb file is damaged: a grid is not of the type that the file says";
 
 fn floats(grid: AnyGrid) -> Decoded<FloatGrid> {
-    grid.floats().ok_or_else(|| ASTRAY.to_string())
+    grid.floats().ok_or_else(|| WRONG_TYPE.to_string())
 }

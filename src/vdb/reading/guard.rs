@@ -37,11 +37,11 @@ const MEMORY_PER_BYTE: u64 = 64;
 const FIXED_SECONDS: f64 = 2.0;
 const SECONDS_PER_MB: f64 = 0.5;
 /// Wall-clock limit relative to the CPU limit: a child may wait for a disk or for other work.
-const WAITING: f64 = 8.0;
+const WALL_PER_CPU: f64 = 8.0;
 /// Polling interval of a child: at first, and later.
-const LOOKS: [Duration; 2] = [Duration::from_micros(500), Duration::from_millis(5)];
+const POLL_INTERVALS: [Duration; 2] = [Duration::from_micros(500), Duration::from_millis(5)];
 /// Maximum number of bytes kept of a child's stderr.
-const MOST_WORDS: u64 = 1 << 14;
+const MAX_STDERR: u64 = 1 << 14;
 
 /// The guard installed in this process.
 static INSTALLED: OnceLock<Guard> = OnceLock::new();
@@ -67,7 +67,7 @@ pub fn install(guard: Guard) {
 
 /// The guard for a file: none if no guard is installed, or if the file is our own, known by the hash in its shot's record.
 pub(in crate::vdb) fn of(path: &Path) -> Option<&'static Guard> {
-    INSTALLED.get().filter(|_| !manifest::knows(path))
+    INSTALLED.get().filter(|_| !manifest::is_recorded(path))
 }
 
 impl Guard {
@@ -76,9 +76,9 @@ impl Guard {
     /// # Errors
     /// As there; [`Error::Cancelled`]; a program that cannot be started.
     pub fn describe(&self, path: &Path) -> Result<Vec<GridInfo>> {
-        match self.ask(path, Wanted::Infos)? {
+        match self.decode_in_child(path, Wanted::Infos)? {
             Contents::Infos(infos) => Ok(infos),
-            _ => Err(astray(path)),
+            _ => Err(unexpected(path)),
         }
     }
 
@@ -119,28 +119,28 @@ impl Guard {
     /// # Errors
     /// As [`Guard::describe`].
     pub fn read_points(&self, path: &Path, name: Option<&str>) -> Result<Points> {
-        match self.ask(path, Wanted::Points(name))? {
+        match self.decode_in_child(path, Wanted::Points(name))? {
             Contents::Points(points, skipped) => {
-                point_arrays::warn_of(path, &skipped);
+                point_arrays::warn_of_skipped(path, &skipped);
                 Ok(points)
             }
-            _ => Err(astray(path)),
+            _ => Err(unexpected(path)),
         }
     }
 
     fn one(&self, path: &Path, wanted: Wanted<'_>) -> Result<AnyGrid> {
-        self.grids(path, wanted)?.into_iter().next().ok_or_else(|| astray(path))
+        self.grids(path, wanted)?.into_iter().next().ok_or_else(|| unexpected(path))
     }
 
     fn grids(&self, path: &Path, wanted: Wanted<'_>) -> Result<Vec<AnyGrid>> {
-        match self.ask(path, wanted)? {
+        match self.decode_in_child(path, wanted)? {
             Contents::Grids(grids) => Ok(grids),
-            _ => Err(astray(path)),
+            _ => Err(unexpected(path)),
         }
     }
 
-    /// Lets a child read a file.
-    fn ask(&self, path: &Path, wanted: Wanted<'_>) -> Result<Contents> {
+    /// Decodes a file in a child.
+    fn decode_in_child(&self, path: &Path, wanted: Wanted<'_>) -> Result<Contents> {
         // Errors that can be found without OpenVDB need no child.
         decode::check(path)?;
         let length = std::fs::metadata(path).map_err(|error| Error::io(path, "read", error))?.len();
@@ -149,12 +149,12 @@ impl Guard {
         let limits = Limits { memory, seconds: seconds.ceil() as u64 };
         let shared = memfd_create("frazil-vdb", MemfdFlags::CLOEXEC)
             .map_err(|error| Error::io(path, "share memory to read", error.into()))?;
-        let (status, words) = self.run(path, wanted, limits, &shared)?;
+        let (status, stderr_text) = self.run(path, wanted, limits, &shared)?;
         let file = File::from(shared);
         // SAFETY: the child has ended, and nobody else can access the file.
         let parcel = unsafe { Mapping::new(&file) }.ok();
         let contents = parcel.as_ref().and_then(|parcel| unpack(parcel, self.threads));
-        let warnings = || words.lines().map(one_line).filter(|line| !line.is_empty());
+        let warnings = || stderr_text.lines().map(one_line).filter(|line| !line.is_empty());
         match contents {
             Some(Contents::Refusal(what)) => Err(Error::file(path, what)),
             Some(contents) => {
@@ -163,7 +163,7 @@ impl Guard {
             }
             None => {
                 warnings().for_each(|line| log::info!("{}: {line}", path.display()));
-                Err(self.fall(path, status, &words, limits))
+                Err(self.failure(path, status, &stderr_text, limits))
             }
         }
     }
@@ -189,10 +189,10 @@ impl Guard {
             .spawn()
             .map_err(|error| Error::io(&self.program, "start", error))?;
         let stderr = child.stderr.take();
-        let words = std::thread::spawn(move || stderr.map(first_words).unwrap_or_default());
+        let stderr_text = std::thread::spawn(move || stderr.map(first_bytes).unwrap_or_default());
         let ended = self.wait(&mut child, limits);
-        let words = words.join().unwrap_or_default();
-        Ok((ended?, words))
+        let stderr_text = stderr_text.join().unwrap_or_default();
+        Ok((ended?, stderr_text))
     }
 
     /// Waits for a child; kills it if it takes too long or the flag is set. None if other code in this process has already collected its
@@ -214,21 +214,21 @@ impl Guard {
                 return Err(Error::Cancelled);
             }
             let waited = start.elapsed();
-            if waited.as_secs_f64() > limits.seconds as f64 * WAITING {
+            if waited.as_secs_f64() > limits.seconds as f64 * WALL_PER_CPU {
                 return Ok(kill(child));
             }
-            std::thread::sleep(LOOKS[usize::from(waited > Duration::from_millis(200))]);
+            std::thread::sleep(POLL_INTERVALS[usize::from(waited > Duration::from_millis(200))]);
         }
     }
 
     /// The error for a child that left no parcel (its result, `parcel.rs`).
-    fn fall(&self, path: &Path, status: Option<ExitStatus>, words: &str, limits: Limits) -> Error {
-        const ENDED: [i32; 3] = [1, 2, 15];
+    fn failure(&self, path: &Path, status: Option<ExitStatus>, stderr_text: &str, limits: Limits) -> Error {
+        const TERMINATED: [i32; 3] = [1, 2, 15];
         const KILLED: i32 = 9;
         const CPU_TIME: i32 = 24;
         const FILE_SIZE: i32 = 25;
         let memory = ["bad_alloc", "memory allocation of", "Cannot allocate memory", "No space left"];
-        if memory.iter().any(|text| words.contains(text)) {
+        if memory.iter().any(|text| stderr_text.contains(text)) {
             let what = format!(
                 "the .vdb file is damaged, or needs more memory than the {} MB that decoding it may take",
                 limits.memory / 1_000_000
@@ -237,7 +237,7 @@ impl Guard {
         }
         let signal = status.and_then(|status| status.signal());
         // Ctrl-C reaches every process of a terminal.
-        if signal.is_some_and(|signal| ENDED.contains(&signal)) {
+        if signal.is_some_and(|signal| TERMINATED.contains(&signal)) {
             return Error::Cancelled;
         }
         Error::file(
@@ -259,19 +259,19 @@ impl Guard {
 }
 
 /// The first bytes from a pipe; the rest is read and discarded, so that the writer never blocks.
-fn first_words(mut pipe: impl Read) -> String {
+fn first_bytes(mut pipe: impl Read) -> String {
     let mut kept = Vec::new();
-    let _ = pipe.by_ref().take(MOST_WORDS).read_to_end(&mut kept);
+    let _ = pipe.by_ref().take(MAX_STDERR).read_to_end(&mut kept);
     let _ = std::io::copy(&mut pipe, &mut std::io::sink());
     String::from_utf8_lossy(&kept).into_owned()
 }
 
 /// Rejects a grid that is not of floats.
 fn floats(path: &Path, grid: AnyGrid) -> Result<FloatGrid> {
-    grid.floats().ok_or_else(|| astray(path))
+    grid.floats().ok_or_else(|| unexpected(path))
 }
 
 /// The error for a parcel that is complete but has other contents than requested.
-fn astray(path: &Path) -> Error {
+fn unexpected(path: &Path) -> Error {
     Error::file(path, "the .vdb file is damaged: decoding it came to nothing")
 }

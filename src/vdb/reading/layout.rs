@@ -22,7 +22,7 @@ const FILE_COMPRESSION: std::ops::Range<u32> = 220..222;
 /// First version with compression flags per grid.
 const GRID_COMPRESSION: u32 = 222;
 /// Longest name that is read (bytes).
-const LONGEST_NAME: u64 = 1 << 16;
+const MAX_NAME: u64 = 1 << 16;
 
 /// The structure of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -31,7 +31,7 @@ pub struct Layout {
     pub version: u32,
     /// The grids in the file's order. None if the file has no offsets: a stream, or an unknown version. Only decoding shows whether such a
     /// file is complete.
-    pub grids: Option<Vec<Place>>,
+    pub grids: Option<Vec<GridExtent>>,
 }
 
 impl Layout {
@@ -41,9 +41,9 @@ impl Layout {
     }
 }
 
-/// The position of a grid in its file.
+/// A grid in its file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Place {
+pub struct GridExtent {
     /// Its name, without the number that OpenVDB appends to names that are not unique.
     pub name: String,
     /// OpenVDB's name of its type.
@@ -80,19 +80,19 @@ fn damaged(what: impl std::fmt::Display) -> Fault {
 /// # Errors
 /// [`Fault::Content`] for a file that is empty, of another kind, too short for its offsets, or inconsistent.
 pub fn read(source: impl Read + Seek) -> Result<Layout, Fault> {
-    let mut walk = Walk::new(source)?;
-    let (version, has_offsets) = walk.head()?;
+    let mut reader = ForwardReader::new(source)?;
+    let (version, has_offsets) = reader.head()?;
     let Some(has_offsets) = has_offsets else { return Ok(Layout { version, grids: None }) };
-    walk.metadata(walk.length, "metadata of the file")?;
-    let count = walk.u32("number of grids")? as i32;
+    reader.metadata(reader.length, "metadata of the file")?;
+    let count = reader.u32("number of grids")? as i32;
     fail_if(count < 0, || damaged(format_args!("it says that it holds {count} grids")))?;
     if !has_offsets {
         return Ok(Layout { version, grids: None });
     }
     let mut grids = Vec::new();
     for index in 0..count {
-        let grid = walk.grid(version, index)?;
-        walk.go_to(grid.end)?;
+        let grid = reader.grid(version, index)?;
+        reader.go_to(grid.end)?;
         grids.push(grid);
     }
     Ok(Layout { version, grids: Some(grids) })
@@ -104,28 +104,28 @@ pub fn read(source: impl Read + Seek) -> Result<Layout, Fault> {
 /// As [`read`], up to the end of the metadata.
 pub fn metadata(source: impl Read + Seek) -> Result<Vec<(String, String, Vec<u8>)>, Fault> {
     const PART: &str = "metadata of the file";
-    let mut walk = Walk::new(source)?;
+    let mut reader = ForwardReader::new(source)?;
     let mut out = Vec::new();
-    if walk.head()?.1.is_some() {
-        for _ in 0..walk.u32(PART)? {
-            let (key, kind, size) = walk.entry(PART)?;
-            walk.expect(size, PART)?;
+    if reader.head()?.1.is_some() {
+        for _ in 0..reader.u32(PART)? {
+            let (key, kind, size) = reader.entry(PART)?;
+            reader.expect(size, PART)?;
             let mut bytes = vec![0; size as usize];
-            walk.fill(&mut bytes, PART)?;
+            reader.fill(&mut bytes, PART)?;
             out.push((key, kind, bytes));
         }
     }
     Ok(out)
 }
 
-/// Reads forward, never beyond the end.
-struct Walk<R> {
+/// Reads a file forward, never beyond its end.
+struct ForwardReader<R> {
     source: R,
     at: u64,
     length: u64,
 }
 
-impl<R: Read + Seek> Walk<R> {
+impl<R: Read + Seek> ForwardReader<R> {
     fn new(mut source: R) -> Result<Self, Fault> {
         let length = source.seek(SeekFrom::End(0))?;
         source.seek(SeekFrom::Start(0))?;
@@ -174,7 +174,7 @@ impl<R: Read + Seek> Walk<R> {
     fn name(&mut self, part: &str) -> Result<String, Fault> {
         let length = u64::from(self.u32(part)?);
         self.expect(length, part)?;
-        fail_if(length > LONGEST_NAME, || damaged(format_args!("a name of {length} bytes in its {part}")))?;
+        fail_if(length > MAX_NAME, || damaged(format_args!("a name of {length} bytes in its {part}")))?;
         let mut text = vec![0; length as usize];
         self.fill(&mut text, part)?;
         Ok(String::from_utf8_lossy(&text).into_owned())
@@ -220,7 +220,7 @@ impl<R: Read + Seek> Walk<R> {
     }
 
     /// Reads the description of a grid, and checks that its parts lie within the file.
-    fn grid(&mut self, version: u32, index: i32) -> Result<Place, Fault> {
+    fn grid(&mut self, version: u32, index: i32) -> Result<GridExtent, Fault> {
         let part = format!("description of grid {}", index + 1);
         let unique = self.name(&part)?;
         let name = unique.split('\u{1e}').next().unwrap_or_default().to_string();
@@ -250,7 +250,7 @@ impl<R: Read + Seek> Walk<R> {
             }
             self.metadata(values.unwrap_or(end), &part)?;
         }
-        Ok(Place { name, value_type, begin, values, end })
+        Ok(GridExtent { name, value_type, begin, values, end })
     }
 }
 
@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn metadata_is_read_as_it_stands() {
+    fn metadata_is_read_in_the_order_of_the_file() {
         for version in [211, 224] {
             let bytes = file(version, true);
             let all = metadata(Cursor::new(&bytes)).unwrap();
@@ -318,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stream_and_a_newer_version_say_that_they_are_not_known() {
+    fn a_stream_and_a_newer_version_have_no_known_grids() {
         assert_eq!(read(Cursor::new(file(224, false))).unwrap().grids, None);
         assert_eq!(read(Cursor::new(file(225, true))).unwrap(), Layout { version: 225, grids: None });
     }

@@ -22,8 +22,8 @@ use crate::vdb::vectors::{AnyGrid, VectorGrid};
 /// The first bytes of a parcel; they change with its format.
 const MAGIC: [u8; 8] = *b"frzpack3";
 
-/// Bytes of a leaf with such values in each of the three arrays.
-const fn sizes<V>() -> [usize; 3] {
+/// Bytes per leaf in each of the three arrays, for leaves with values of type `V`.
+const fn array_sizes<V>() -> [usize; 3] {
     [12, size_of::<Mask>(), size_of::<V>()]
 }
 /// Leaves per write.
@@ -113,7 +113,7 @@ fn write_leaves<V: LeafValues>(
     at: &mut usize,
     leaves: &[Leaf<'_, V>],
 ) -> std::io::Result<()> {
-    for (array, size) in sizes::<V>().into_iter().enumerate() {
+    for (array, size) in array_sizes::<V>().into_iter().enumerate() {
         file.write_all(&[0; ALIGN][..at.next_multiple_of(ALIGN) - *at])?;
         *at = at.next_multiple_of(ALIGN) + size * leaves.len();
         for batch in leaves.chunks(BATCH) {
@@ -127,10 +127,10 @@ fn write_leaves<V: LeafValues>(
                 .iter()
                 .map(|leaf| IoSlice::new(if array == 1 { leaf.mask_bytes() } else { leaf.value_bytes() }))
                 .collect();
-            let mut left = slices.as_mut_slice();
-            while !left.is_empty() {
-                let written = file.write_vectored(left)?;
-                IoSlice::advance_slices(&mut left, written);
+            let mut remaining = slices.as_mut_slice();
+            while !remaining.is_empty() {
+                let written = file.write_vectored(remaining)?;
+                IoSlice::advance_slices(&mut remaining, written);
             }
         }
     }
@@ -197,19 +197,23 @@ struct Arrays {
 
 /// The arrays of this many leaves, from an offset in the parcel, which then moves past them.
 fn arrays<V>(parcel: &[u8], at: &mut usize, count: usize) -> Option<Arrays> {
-    let sizes = sizes::<V>();
+    let array_sizes = array_sizes::<V>();
     let mut arrays = [&parcel[..0]; 3];
-    for (array, size) in arrays.iter_mut().zip(sizes) {
+    for (array, size) in arrays.iter_mut().zip(array_sizes) {
         let begin = at.next_multiple_of(ALIGN);
         *at = begin.checked_add(size.checked_mul(count)?)?;
         *array = parcel.get(begin..*at)?;
     }
     let [origins, masks, values] = arrays;
-    let whole = |four: &[u8]| i32::from_ne_bytes([four[0], four[1], four[2], four[3]]);
-    let origins: Vec<i32> = origins.chunks_exact(4).map(whole).collect();
+    let integer = |four: &[u8]| i32::from_ne_bytes([four[0], four[1], four[2], four[3]]);
+    let origins: Vec<i32> = origins.chunks_exact(4).map(integer).collect();
     origins.iter().all(|position| position % 8 == 0).then_some(())?;
     let addresses = |array: &[u8], size: usize| -> Vec<usize> {
         (0..count).map(|leaf| array.as_ptr() as usize + leaf * size).collect()
     };
-    Some(Arrays { origins, values: addresses(values, sizes[2]), masks: addresses(masks, sizes[1]) })
+    Some(Arrays {
+        origins,
+        values: addresses(values, array_sizes[2]),
+        masks: addresses(masks, array_sizes[1]),
+    })
 }

@@ -54,8 +54,8 @@ fn bodies_that_share_an_edge_crowd_it() {
     let joined = tetrahedron_and(&others, &[[0, 5, 4], [0, 4, 3], [4, 5, 3], [5, 0, 3]]);
     let faults = Faults::of(&joined);
     assert!(!faults.is_solid() && faults.is_embedded() && !faults.by_index.is_watertight());
-    assert_eq!((faults.crowded_edges, faults.non_manifold_vertices, faults.genus), (1, 2, None));
-    assert_eq!((faults.by_index.crowded_edges, faults.by_index.non_manifold_vertices), (1, 2));
+    assert_eq!((faults.non_manifold_edges, faults.non_manifold_vertices, faults.genus), (1, 2, None));
+    assert_eq!((faults.by_index.non_manifold_edges, faults.by_index.non_manifold_vertices), (1, 2));
     assert_eq!((faults.open_edges, faults.turned_edges), (0, 0));
 }
 

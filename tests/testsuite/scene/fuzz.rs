@@ -231,7 +231,7 @@ fn ten_thousand_changed_records_are_used_or_refused() {
         } else {
             let mut content = serde_json::from_str::<Value>(&whole).unwrap()["content"].take();
             changed(&mut random, &mut content);
-            checksummed::sealed(&content).unwrap()
+            checksummed::to_text(&content).unwrap()
         };
         fs::write(&record, &text).unwrap();
         survives(&text, || {

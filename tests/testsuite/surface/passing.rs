@@ -1,7 +1,7 @@
 //! Two bodies that pass by each other: the mesh is one where their particles' surface is, and nowhere else.
 
 use frazil::geometry::DVec3;
-use frazil::geometry::check::topology::bodies;
+use frazil::geometry::check::topology::components;
 use frazil::surface::{Params, Tracker};
 
 use crate::common::liquids::{context, filled, numbered, own_surface};
@@ -33,7 +33,7 @@ fn the_mesh_is_one_where_the_particles_own_surface_is_one() {
             let report = tracker.step(&ctx, &from, &to, 1.0 / 24.0).expect("a step");
             from = to;
             changed += report.change.map_or(0, |change| change.flagged_cells);
-            counts.push([bodies(tracker.triangles()).len(), bodies(&own(frame).triangles).len()]);
+            counts.push([components(tracker.triangles()).len(), components(&own(frame).triangles).len()]);
         }
         let [first, middle, last] = [0, FRAMES / 2 - 1, FRAMES - 1].map(|at| counts[at]);
         assert_eq!([first, last], [[2; 2]; 2], "{gap}: {counts:?}");

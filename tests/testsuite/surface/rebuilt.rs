@@ -4,7 +4,7 @@ use crate::common::skip::skipped;
 use std::fs;
 use std::path::Path;
 
-use frazil::geometry::check::topology::{Topology, bodies};
+use frazil::geometry::check::topology::{Topology, components};
 use frazil::geometry::mesh::attributes::{Number, On};
 use frazil::geometry::{DVec3, DetailedMesh, TriMesh, Uvs, Vec3};
 use frazil::io::mesh;
@@ -169,7 +169,7 @@ fn balls_meet_and_part_and_the_rest_of_the_mesh_stays_as_it_is() {
         is_whole(&now.mesh, number);
         carries_all(&now, &first, number);
         far_is_as_it_was(&now, &first, number);
-        parts.push(bodies(&now.mesh.triangles).len());
+        parts.push(components(&now.mesh.triangles).len());
         let told = |key: &str| reported(folder, "out", number, key);
         let counts = ["changed_cells", "rebuilt_cells", "made_triangles"].map(told);
         assert_eq!(told("vertices"), now.mesh.positions.len() as u64, "frame {number}");
@@ -390,7 +390,7 @@ fn a_liquid_that_is_gone_takes_its_mesh_along_and_one_that_appears_is_meshed() {
     assert!(begun.positions.iter().any(|position| near(position, last_of_one + 1)));
     let last = frame(folder, "out", frames).mesh;
     assert!(last.positions.iter().all(|position| near(position, frames)));
-    assert_eq!(bodies(&last.triangles).len(), 1);
+    assert_eq!(components(&last.triangles).len(), 1);
     let volume = last.volume() / (count as f64 * SPACING.powi(3));
     assert!((0.7..1.2).contains(&volume), "{volume} of the particles' own");
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use frazil::geometry::check::topology::bodies;
+use frazil::geometry::check::topology::components;
 use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::io::mesh;
 use frazil::surface::{Implicit, Isosurface};
@@ -67,7 +67,7 @@ fn a_drop_of_fewer_particles_than_min_drop_is_taken_away() {
             let count = now.positions.iter().filter(is_near).count();
             let is_right = if wanted == 0 { count > 20 } else { count == 0 };
             assert!(is_right, "{count} vertices at the drop in frame {number} of {out}");
-            assert_eq!(bodies(&now.triangles).len(), if wanted == 0 { 2 } else { 1 }, "{out}, {number}");
+            assert_eq!(components(&now.triangles).len(), if wanted == 0 { 2 } else { 1 }, "{out}, {number}");
         }
     }
 }
@@ -81,7 +81,7 @@ fn outer_surface(places: &[DVec3]) -> TriMesh {
         let triangles = part.iter().map(|triangle| whole.triangles[*triangle as usize]).collect();
         TriMesh { positions: whole.positions.clone(), triangles }.without_unused()
     };
-    let parts = bodies(&whole.triangles);
+    let parts = components(&whole.triangles);
     assert_eq!(parts.len(), 2, "a surface outside, and one inside");
     parts.into_iter().map(of_part).max_by(|a, b| a.volume().total_cmp(&b.volume())).unwrap()
 }
@@ -107,7 +107,7 @@ fn a_bubble_that_the_mesh_lacks_is_meshed_where_all_of_it_is_matched() {
         assert_eq!(reported(folder, out, frames, "bubbles"), 1, "{out}");
     }
     let meshed = frame(folder, "every", frames);
-    assert!(meshed.is_manifold() && bodies(&meshed.triangles).len() == 2);
+    assert!(meshed.is_manifold() && components(&meshed.triangles).len() == 2);
     // Its surface lies 4.5 spacings from the middle: 380 cubes.
     let bubble = (outer.volume() - meshed.volume()) / SPACING.powi(3);
     assert!((340.0..420.0).contains(&bubble), "{bubble} cubes of a spacing");

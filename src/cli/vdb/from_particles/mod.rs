@@ -247,7 +247,7 @@ impl Args {
             log::warn!("{}: holds no particles: its surface is empty", path.display());
             return Ok(data);
         }
-        self.space.space().bring(&mut data);
+        self.space.space().convert(&mut data);
         if let (Some(low), Some(high)) = (self.box_min, self.box_max) {
             let is_inside = |p: &DVec3| (0..3).all(|axis| (low[axis]..=high[axis]).contains(&p[axis]));
             let is_kept: Vec<bool> = data.positions.iter().map(is_inside).collect();

@@ -34,10 +34,10 @@ impl Orientation {
         let mut out = Self::default();
         let mut pieces = Pieces::new(positions, named, numbers);
         if is_regular {
-            pieces.take_parts(parts_of(pieces.count(), &uses), &uses);
+            pieces.set_parts(parts_of(pieces.count(), &uses), &uses);
         } else {
             out.fates = vec![Fate::Stays; triangles.len()];
-            pieces.sort_out(triangles, closing, &mut out);
+            pieces.find_parts(triangles, closing, &mut out);
         }
         pieces.turn_outward(closing, triangles.len(), &mut out);
         if out.fates.iter().all(|fate| *fate == Fate::Stays) {
@@ -157,7 +157,7 @@ impl Doubts {
                 "parts have one side only (inconsistently oriented edges)",
             ),
             counted(
-                self.crowded_edges,
+                self.non_manifold_edges,
                 "non-manifold edge has more than two triangles that do not agree",
                 "non-manifold edges have more than two triangles that do not agree",
             ),

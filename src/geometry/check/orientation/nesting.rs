@@ -16,7 +16,7 @@ pub(super) const ASLANT: [DVec3; 3] = [
 /// Nearly straight up.
 const UP: DVec3 = DVec3::new(1.3e-5, 1.0, -0.7e-5);
 /// Points within this fraction of the overall size lie on a surface: 32-bit coordinates are that coarse.
-const ON: f64 = 1.0e-6;
+const ON_SURFACE: f64 = 1.0e-6;
 /// Triangles whose centres are tested if the outermost corners of a part all lie on others.
 const MIDDLES: usize = 16;
 
@@ -144,42 +144,42 @@ impl<'a> Space<'a> {
             owner.resize(corners.len(), part);
         }
         let tree = Bvh::new(&TriMesh::soup(corners.as_flattened().to_vec()));
-        Self { shapes, low, near: ON * (high - low).norm(), corners, tree, owner }
+        Self { shapes, low, near: ON_SURFACE * (high - low).norm(), corners, tree, owner }
     }
 
-    /// The other parts that hold a point, ascending, each with whether the point is strictly inside and not on the surface.
+    /// The other parts that contain a point, ascending, each with whether the point is strictly inside and not on the surface.
     fn holders(&self, point: DVec3, own: u32) -> Vec<(u32, bool)> {
         let point = (point - self.low).cast::<f32>();
         let origin: DVec3 = point.cast();
-        let room = Vec3::repeat(self.near as f32);
+        let margin = Vec3::repeat(self.near as f32);
         let mut out = Vec::new();
-        self.tree.in_box(point - room, point + room, |triangle| {
+        self.tree.in_box(point - margin, point + margin, |triangle| {
             let is_on =
-                || Facet::new(self.corners[triangle], 0).found(origin, 0).square <= self.near * self.near;
+                || Facet::new(self.corners[triangle], 0).nearest(origin, 0).square <= self.near * self.near;
             if self.owner[triangle] != own && is_on() {
                 out.push((self.owner[triangle], false));
             }
         });
         out.sort_unstable();
         out.dedup();
-        let mut met: Vec<(u32, usize, i32)> = Vec::new();
+        let mut hits: Vec<(u32, usize, i32)> = Vec::new();
         for (axis, direction) in ASLANT.into_iter().chain([UP]).enumerate() {
-            self.tree.crossings(origin, direction, |triangle, way| {
+            self.tree.crossings(origin, direction, |triangle, sign| {
                 let part = self.owner[triangle];
                 let is_bottomless = self.shapes[part as usize].is_bottomless;
                 if part != own && is_bottomless == (axis == ASLANT.len()) {
-                    met.push((part, axis, way));
+                    hits.push((part, axis, sign));
                 }
             });
         }
-        met.sort_unstable();
+        hits.sort_unstable();
         let on = out.len();
-        for of_part in met.chunk_by(|a, b| a.0 == b.0) {
+        for of_part in hits.chunk_by(|a, b| a.0 == b.0) {
             let (part, sign) = (of_part[0].0, self.shapes[of_part[0].0 as usize].sign());
             let along = of_part.chunk_by(|a, b| a.1 == b.1);
-            let votes = along.filter(|met| sign * met.iter().map(|met| met.2).sum::<i32>() > 0).count();
-            let least = if self.shapes[part as usize].is_bottomless { 1 } else { 2 };
-            if votes >= least && !out[..on].contains(&(part, false)) {
+            let votes = along.filter(|hits| sign * hits.iter().map(|hit| hit.2).sum::<i32>() > 0).count();
+            let min_votes = if self.shapes[part as usize].is_bottomless { 1 } else { 2 };
+            if votes >= min_votes && !out[..on].contains(&(part, false)) {
                 out.push((part, true));
             }
         }
@@ -194,7 +194,7 @@ impl<'a> Space<'a> {
             if is_high { shape.corners().max_by(by_axis) } else { shape.corners().min_by(by_axis) }
         };
         let ends = (0..3).flat_map(|axis| [end(axis, false), end(axis, true)]).flatten();
-        // Most parts are outside: one corner is enough to tell.
+        // Most parts are outside, which one corner decides.
         let holders = |point: DVec3| Some(self.holders(point, part)).filter(|held| !held.is_empty());
         let Some(mut held) = ends.map(holders).collect::<Option<Vec<Vec<(u32, bool)>>>>() else {
             return Position::Outside;

@@ -24,7 +24,7 @@ pub struct Doubts {
     /// Parts with only one side, where no choice makes all triangles agree.
     pub one_sided: usize,
     /// Non-manifold edges that do not determine which side is out.
-    pub crowded_edges: usize,
+    pub non_manifold_edges: usize,
     /// Inside-out parts whose inner parts may or may not be cavities.
     pub nested: usize,
 }

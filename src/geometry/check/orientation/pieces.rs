@@ -25,7 +25,7 @@ pub(super) struct Pieces<'a> {
     named: Vec<[u32; 3]>,
     /// Their indices in the mesh.
     numbers: Vec<u32>,
-    /// The part of each.
+    /// The part of each triangle.
     part: Vec<u32>,
     /// For each part, by its name, whether it is open.
     is_open: Vec<bool>,
@@ -42,7 +42,7 @@ impl<'a> Pieces<'a> {
     }
 
     /// Sets the parts of triangles that all agree with their neighbours.
-    pub(super) fn take_parts(&mut self, part: Vec<u32>, uses: &[Use]) {
+    pub(super) fn set_parts(&mut self, part: Vec<u32>, uses: &[Use]) {
         self.is_open = vec![false; part.len()];
         self.part = part;
         let open = uses.chunk_by(is_same_edge).filter(|run| run.len() == 1);
@@ -74,7 +74,7 @@ impl<'a> Pieces<'a> {
     }
 
     /// Finds the parts of triangles that have duplicates, neighbours that disagree, or non-manifold edges.
-    pub(super) fn sort_out(&mut self, triangles: &[[u32; 3]], closing: Closing, out: &mut Orientation) {
+    pub(super) fn find_parts(&mut self, triangles: &[[u32; 3]], closing: Closing, out: &mut Orientation) {
         let vertices = self.positions.len();
         let raw: Vec<[u32; 3]> = self.numbers.iter().map(|at| triangles[*at as usize]).collect();
         let uses = edge_uses(vertices, &raw);
@@ -117,7 +117,7 @@ impl<'a> Pieces<'a> {
     /// Names the parts: patches that are closed or connected to no other, and what remains of each component.
     fn divide(&mut self, uses: &[Use], agreement: &Agreement, out: &mut Orientation) {
         let count = self.named.len();
-        let bodies = parts_of(count, uses);
+        let components = parts_of(count, uses);
         let Agreement { turned, patch, one_sided } = agreement;
         let agreed: Vec<[u32; 3]> = self
             .named
@@ -125,10 +125,10 @@ impl<'a> Pieces<'a> {
             .zip(turned)
             .map(|(&[a, b, c], turned)| if *turned { [a, c, b] } else { [a, b, c] })
             .collect();
-        let (mut is_closed, mut is_crowded) = (vec![true; count], vec![false; count]);
+        let (mut is_closed, mut has_non_manifold) = (vec![true; count], vec![false; count]);
         let mut of_run: Vec<Use> = Vec::new();
         for run in uses.chunk_by(is_same_edge).filter(|run| run.len() != 2) {
-            is_crowded[bodies[run[0].1 as usize] as usize] |= run.len() > 2;
+            has_non_manifold[components[run[0].1 as usize] as usize] |= run.len() > 2;
             of_run.clear();
             of_run.extend_from_slice(run);
             of_run.sort_by_key(|used| patch[used.1 as usize]);
@@ -137,28 +137,29 @@ impl<'a> Pieces<'a> {
             }
         }
         one_sided.iter().for_each(|patch| is_closed[*patch as usize] = false);
-        let is_left = |at: usize| is_crowded[bodies[at] as usize] && !is_closed[patch[at] as usize];
+        let is_left = |at: usize| has_non_manifold[components[at] as usize] && !is_closed[patch[at] as usize];
         // What remains of a component has a name that no patch has.
-        self.part =
-            (0..count).map(|at| if is_left(at) { count as u32 + bodies[at] } else { patch[at] }).collect();
+        self.part = (0..count)
+            .map(|at| if is_left(at) { count as u32 + components[at] } else { patch[at] })
+            .collect();
         self.is_open = (0..count).map(|patch| !is_closed[patch]).chain(vec![false; count]).collect();
         for run in uses.chunk_by(is_same_edge) {
             let left: Vec<Use> = run.iter().copied().filter(|used| is_left(used.1 as usize)).collect();
             let off = imbalance(&self.named, &left);
             if off != 0 {
-                self.is_open[count + bodies[left[0].1 as usize] as usize] = true;
-                out.doubts.crowded_edges += usize::from(left.len().is_multiple_of(2));
+                self.is_open[count + components[left[0].1 as usize] as usize] = true;
+                out.doubts.non_manifold_edges += usize::from(left.len().is_multiple_of(2));
             }
         }
         out.doubts.one_sided += one_sided.len();
         let left: Vec<u32> = (0..count as u32).filter(|at| is_left(*at as usize)).collect();
         if left.iter().any(|at| !self.is_open[self.part[*at as usize] as usize]) {
-            out.doubts.crowded_edges += self.backward(&left, patch);
+            out.doubts.non_manifold_edges += self.count_inverted(&left, patch);
         }
     }
 
-    /// Of the closed remainders of components, the patches with a negative winding number on a side: parts of them are inside out.
-    fn backward(&self, left: &[u32], patch: &[u32]) -> usize {
+    /// Counts the patches of closed remainders that have a negative winding number on a side: parts of those remainders are inside out.
+    fn count_inverted(&self, left: &[u32], patch: &[u32]) -> usize {
         let mut order: Vec<u32> = left.to_vec();
         order.sort_by_key(|at| self.part[*at as usize]);
         let mut found = 0;
@@ -167,7 +168,7 @@ impl<'a> Pieces<'a> {
                 continue;
             }
             let (volume, low, size) = self.volume(part);
-            let way = if volume < 0.0 { -1 } else { 1 };
+            let sign = if volume < 0.0 { -1 } else { 1 };
             let local = |at: &u32| self.corners(*at as usize).map(|p| (p - low).cast::<f32>());
             let tree = Bvh::new(&TriMesh::soup(part.iter().flat_map(local).collect()));
             let mut largest: Vec<(u32, f64, u32)> =
@@ -177,31 +178,31 @@ impl<'a> Pieces<'a> {
                 let [a, b, c] = self.corners(of_patch[0].2 as usize).map(|p| p - low);
                 let off = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default() * (1e-4 * size);
                 let beside =
-                    [off, -off].map(|off| tree.surrounding((a + b + c) / 3.0 + off, ASLANT[0]) * way);
+                    [off, -off].map(|off| tree.winding_number((a + b + c) / 3.0 + off, ASLANT[0]) * sign);
                 found += usize::from(beside.iter().any(|count| *count < 0));
             }
         }
         found
     }
 
-    /// Turns open parts up, or so that they bound a volume, if their own orientation does not decide: two-sided sheets, and parts whose
+    /// Turns open parts up, or so that they bound a volume, if their own orientation is ambiguous: two-sided sheets, and parts whose
     /// neighbours disagreed.
     fn face_up(&mut self, agreement: &Agreement, two_sided: &[u32], closing: Closing, out: &mut Orientation) {
         let count = self.named.len();
-        let mut is_asked = vec![false; count];
+        let mut is_undecided = vec![false; count];
         for at in 0..count {
             let is_mixed = agreement.turned[at] && self.part[at] == agreement.patch[at];
             if is_mixed || two_sided.binary_search(&self.numbers[at]).is_ok() {
-                is_asked[agreement.patch[at] as usize] = true;
+                is_undecided[agreement.patch[at] as usize] = true;
             }
         }
-        agreement.one_sided.iter().for_each(|patch| is_asked[*patch as usize] = false);
+        agreement.one_sided.iter().for_each(|patch| is_undecided[*patch as usize] = false);
         let mut sums = vec![0.0f64; count];
-        let is_it = |pieces: &Self, at: usize| {
+        let is_candidate = |pieces: &Self, at: usize| {
             let part = pieces.part[at] as usize;
-            part < count && is_asked[part] && pieces.is_open[part]
+            part < count && is_undecided[part] && pieces.is_open[part]
         };
-        for at in (0..count).filter(|at| is_it(self, *at)) {
+        for at in (0..count).filter(|at| is_candidate(self, *at)) {
             let first = self.corners(self.part[at] as usize)[0];
             let corners = self.corners(at);
             sums[self.part[at] as usize] += match closing {
@@ -210,7 +211,7 @@ impl<'a> Pieces<'a> {
             };
         }
         for at in 0..count {
-            if is_it(self, at) && sums[self.part[at] as usize] < 0.0 {
+            if is_candidate(self, at) && sums[self.part[at] as usize] < 0.0 {
                 self.turn(at, out);
             }
         }
@@ -301,7 +302,7 @@ impl<'a> Pieces<'a> {
             .map(|[i, j]| if i < j { ([i, j], 1) } else { ([j, i], -1) })
             .collect();
         edges.sort_unstable();
-        let off = |run: &[([u32; 2], i32)]| (run[0].0, run.iter().map(|(_, way)| way).sum::<i32>());
+        let off = |run: &[([u32; 2], i32)]| (run[0].0, run.iter().map(|(_, sign)| sign).sum::<i32>());
         let open: Vec<([u32; 2], i32)> =
             edges.chunk_by(|a, b| a.0 == b.0).map(off).filter(|(_, off)| *off != 0).collect();
         let mut rim: Vec<u32> = open.iter().flat_map(|(ends, _)| *ends).collect();

@@ -34,7 +34,7 @@ const MAX_LIKELY_WIDTH: f64 = 20.0;
 
 /// The warning about a mesh (m) so far from the origin that 32-bit numbers round it too much.
 fn rounding_warning(path: &Path, mesh: &TriMesh, cell: f64) -> Option<String> {
-    mesh::too_far(&path.display().to_string(), mesh.farthest(), 1.0, cell, mesh::BY_KEY)
+    mesh::too_far_warning(&path.display().to_string(), mesh.farthest(), 1.0, cell, mesh::BY_KEY)
 }
 
 /// Contents of a scene's files.

@@ -31,7 +31,7 @@ pub(in crate::scene::shallow) enum Terrain {
     Mesh(TriMesh),
     /// A greyscale image centred at the origin.
     #[cfg(feature = "cli")]
-    Image(image::Grey, ImagePlacement),
+    Image(image::GreyImage, ImagePlacement),
     /// A level set.
     #[cfg(feature = "vdb")]
     Grid(FloatGrid),
@@ -179,7 +179,7 @@ fn of_image(path: &Path, _placement: ImagePlacement, _input_hashes: &InputHashes
 
 /// An image of heights as a mesh, with a vertex at the centre of each pixel.
 #[cfg(feature = "cli")]
-fn image_mesh(image: &image::Grey, placement: ImagePlacement) -> TriMesh {
+fn image_mesh(image: &image::GreyImage, placement: ImagePlacement) -> TriMesh {
     let [across, down] = image.size;
     let [black, white] = placement.heights;
     let at = |axis: usize, index: usize| {
@@ -210,7 +210,7 @@ fn of_vdb(path: &Path, input_hashes: &InputHashes) -> Result<Terrain> {
     // OpenVDB reads the file itself: its content must be the same before and after.
     input_hashes.hash(path)?;
     let grid = file::read_named(path, None)?;
-    input_hashes.note(path, hash::of_file(path)?)?;
+    input_hashes.record(path, hash::of_file(path)?)?;
     if grid.class() != GridClass::LevelSet {
         return Err(Error::file(path, format!("grid \"{}\" is not a level set", grid.name())));
     }

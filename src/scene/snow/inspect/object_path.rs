@@ -9,7 +9,8 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::geometry::check::faults;
-use crate::motion::{Motion, Poses, span};
+use crate::geometry::shape::bounds;
+use crate::motion::{Motion, Poses};
 use crate::scene::snow::Inputs;
 use crate::scene::{Object, Scene};
 use crate::snow::base_layer::Reach;
@@ -279,7 +280,7 @@ fn extents(ctx: &Context, scene: &Scene, body: &Body) -> Result<Vec<Extent>> {
                 pairs.for_each(|(length, (p, q))| *length += (p - q).norm());
             }
             time = at(frame);
-            let (low, high) = span(poses.now());
+            let (low, high) = bounds(poses.now());
             let lower = |a: DVec3, b: &DVec3| if b.y < a.y { *b } else { a };
             let lowest = poses.now().iter().fold(DVec3::repeat(f64::INFINITY), lower);
             let moved = lengths.iter().copied().fold(0.0, f64::max);

@@ -1,7 +1,7 @@
 //! Settings of a scene's grains that have no effect, or probably not the intended one.
 
 use crate::error::Result;
-use crate::motion::span;
+use crate::geometry::shape::bounds;
 use crate::scene::schema::{Value, Values, rounded};
 use crate::scene::{Object, Scene};
 use crate::sweep::Body;
@@ -33,7 +33,7 @@ pub(in crate::scene::snow) fn too_small(
     };
     let mut pose = Vec::new();
     body.motion().pose(time, &mut pose)?;
-    let (low, high) = span(&pose);
+    let (low, high) = bounds(&pose);
     let (size, diameter) = ((high - low).max(), 2.0 * radius);
     Ok((size < diameter).then(|| {
         format!(

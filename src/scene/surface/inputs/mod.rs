@@ -108,7 +108,13 @@ impl Inputs {
         // The mesh lies near the particles, and has 32-bit positions.
         let far = base_mesh::farthest(particles.positions.iter());
         let name = first.display().to_string();
-        warnings.extend(base_mesh::too_far(&name, far, 1.0, surface.cell * spacing, base_mesh::BY_KEY));
+        warnings.extend(base_mesh::too_far_warning(
+            &name,
+            far,
+            1.0,
+            surface.cell * spacing,
+            base_mesh::BY_KEY,
+        ));
         let mut mesh = match &surface.mesh {
             Some(path) => {
                 let (mesh, warning) = read_mesh(ctx, surface, path, &input_hashes, spacing)?;

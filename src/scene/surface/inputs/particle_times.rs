@@ -28,7 +28,7 @@ pub fn read_points(path: &Path, input_hashes: &InputHashes) -> Result<ParticleDa
         return particles::parse(path, &input_hashes.read(path)?);
     }
     source::open(path)?;
-    input_hashes.around(path, || match changes_since(path)? {
+    input_hashes.read_with(path, || match changes_since(path)? {
         Some(since) => Err(Error::file(path, partial(since))),
         None => Ok(points::read(path, None)?.into()),
     })

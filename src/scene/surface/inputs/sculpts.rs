@@ -127,7 +127,7 @@ fn conformed(edited: DetailedMesh, first: &DetailedMesh) -> (DetailedMesh, Vec<S
         (None, None) => None,
         (None, Some(own)) => {
             missing.push("texture coordinates");
-            Some(Uvs::nothing(own.corners.is_some(), vertices, faces))
+            Some(Uvs::zeros(own.corners.is_some(), vertices, faces))
         }
         (Some(uvs), Some(own)) => match (&uvs.corners, own.corners.is_some()) {
             (None, true) => {

@@ -1,6 +1,6 @@
 //! The motion of vertices from one frame to the next, through changes of the mesh.
 
-use crate::geometry::check::topology::around;
+use crate::geometry::check::topology::neighbour_sums;
 use crate::geometry::{DVec3, Vec3};
 use crate::surface::Change;
 
@@ -54,7 +54,7 @@ impl VertexPaths {
         let mut known: Vec<Option<Vec3>> =
             self.start_vertices.iter().map(|start| start.map(|start| before[start as usize])).collect();
         for _ in 0..PASSES {
-            let sums = around(known.len(), triangles, |vertex| known[vertex as usize]);
+            let sums = neighbour_sums(known.len(), triangles, |vertex| known[vertex as usize]);
             for (known, (sum, count)) in known.iter_mut().zip(sums) {
                 if known.is_none() && count > 0 {
                     *known = Some(sum / count as f32);
