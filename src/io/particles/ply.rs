@@ -114,8 +114,8 @@ fn attributes(vertices: &Element, names: &[String], columns: &mut [Vec<f64>]) ->
 /// # Errors
 /// 64-bit integers that a `double` does not hold; what the operating system reports.
 pub fn write(path: &Path, points: &Points) -> Result<()> {
-    let ply_attribute = ply_attributes(points).map_err(|what| Error::file(path, what))?;
-    atomic::write(path, |out| write_to(out, points, &ply_attribute, true))
+    let attributes = ply_attributes(points).map_err(|what| Error::file(path, what))?;
+    atomic::write(path, |out| write_to(out, points, &attributes, true))
 }
 
 /// As [`write()`], without the voxel size: for points that have voxels only because [`Points`] require them.
@@ -123,8 +123,8 @@ pub fn write(path: &Path, points: &Points) -> Result<()> {
 /// # Errors
 /// As [`write()`].
 pub fn write_without_voxels(path: &Path, points: &Points) -> Result<()> {
-    let ply_attribute = ply_attributes(points).map_err(|what| Error::file(path, what))?;
-    atomic::write(path, |out| write_to(out, points, &ply_attribute, false))
+    let attributes = ply_attributes(points).map_err(|what| Error::file(path, what))?;
+    atomic::write(path, |out| write_to(out, points, &attributes, false))
 }
 
 /// The bytes of such a file.
@@ -132,9 +132,9 @@ pub fn write_without_voxels(path: &Path, points: &Points) -> Result<()> {
 /// # Errors
 /// As [`write()`].
 pub fn to_bytes(points: &Points) -> Result<Vec<u8>> {
-    let ply_attribute = ply_attributes(points).map_err(Error::Argument)?;
+    let attributes = ply_attributes(points).map_err(Error::Argument)?;
     let mut out = Vec::new();
-    write_to(&mut out, points, &ply_attribute, true).map_err(|error| Error::Internal(error.to_string()))?;
+    write_to(&mut out, points, &attributes, true).map_err(|error| Error::Internal(error.to_string()))?;
     Ok(out)
 }
 
@@ -242,10 +242,10 @@ mod tests {
             points.set("active", Values::Bool(Column::Each(vec![true, false, true])));
             points.set("trapped", Values::Bool(Column::Each(vec![false, false, true])));
             points.set("source_frame", Values::Int(Column::Each(vec![-1, 2, 3])));
-            let ply_attribute: Vec<PlyAttribute<'_>> =
+            let attributes: Vec<PlyAttribute<'_>> =
                 points.attributes.iter().map(|a| ply_attribute(a).unwrap()).collect();
             let mut bytes = Vec::new();
-            write_to(&mut bytes, &points, &ply_attribute, true).unwrap();
+            write_to(&mut bytes, &points, &attributes, true).unwrap();
             let back = parse(&bytes).unwrap().into_points(None).unwrap();
             assert_eq!((&back.attributes, back.voxel_size), (&points.attributes, 0.5));
             for point in 0..3 {
