@@ -175,11 +175,11 @@ impl MeshFile<'_> {
             let carried = io::mesh::Carried { uvs, arrays: &written, ..Default::default() };
             return io::mesh::write_carried(self.path, mesh, &carried);
         }
-        let own = vectors(arrays, VELOCITY);
-        if own.is_some() {
+        let found = vectors(arrays, VELOCITY);
+        if found.is_some() {
             written.retain(|array| array.on != On::Vertices || !VELOCITY.contains(&&*array.name));
         }
-        let velocities = velocities(own)?;
+        let velocities = velocities(found)?;
         let carried = io::mesh::Carried { velocities: &velocities, uvs, arrays: &written };
         let mesh = usd::MeshFrame::of(self.name, mesh, &carried);
         let text = usd::clip("meshes", self.frame, self.fps, self.units, &[mesh]);
@@ -288,8 +288,8 @@ impl Sequence {
         frame: i32,
         has_warned: &mut bool,
     ) -> frazil::Result<usize> {
-        let own = self.pattern.path(frame);
-        io::files::source::open(&own).inspect_err(|_| self.run = None)?;
+        let input = self.pattern.path(frame);
+        io::files::source::open(&input).inspect_err(|_| self.run = None)?;
         if self.run.is_none() {
             let is_there = |frame: &i32| self.pattern.path(*frame).is_file();
             let last = (frame..=self.last).take_while(is_there).last().unwrap_or(frame);
@@ -299,7 +299,7 @@ impl Sequence {
             self.run = run.ok().map(|run| args.in_metres(Box::new(run)));
         }
         if let Some(motion) = self.run.as_deref() {
-            args.warn_once(&own, motion, frame, has_warned)?;
+            args.warn_once(&input, motion, frame, has_warned)?;
             match args.write(path, motion, frame, true) {
                 Ok(()) => return Ok(motion.triangles().len()),
                 Err(error @ (frazil::Error::Cancelled | frazil::Error::Io { .. })) => return Err(error),
@@ -307,12 +307,12 @@ impl Sequence {
                 Err(_) => self.run = None,
             }
         }
-        let motion = args.static_mesh(&own)?;
-        args.warn_once(&own, &*motion, frame, has_warned)?;
+        let motion = args.static_mesh(&input)?;
+        args.warn_once(&input, &*motion, frame, has_warned)?;
         args.write(path, &*motion, frame, false)?;
         log::info!(
             "{}: converted without velocities: its faces, or those of the next frame, differ",
-            own.display()
+            input.display()
         );
         Ok(motion.triangles().len())
     }
@@ -438,11 +438,11 @@ impl Args {
         let name = prim_name(&self.input);
         let units = usd::Units { metres: 1.0 / self.to_scale, z_up: self.to_up == Axis::Z };
         let file = MeshFile { path, name: &name, frame, fps: self.fps, units };
-        file.write(&mesh, drawn.uvs, &arrays, |own| {
+        file.write(&mesh, drawn.uvs, &arrays, |found| {
             motion.velocities_ahead(time, 1.0 / self.fps, &mut velocities)?;
             to_output_space(&mut velocities);
             // In a sequence, velocities lead from each mesh to the next.
-            Ok(own.filter(|_| !is_sequence).unwrap_or_else(|| usd::to_floats(&velocities)))
+            Ok(found.filter(|_| !is_sequence).unwrap_or_else(|| usd::to_floats(&velocities)))
         })
     }
 }

@@ -1,4 +1,4 @@
-//! Thin liquids: what lies below is visible where they are not opaque, and their surface is glossy.
+//! Thin liquids: partly transparent, with a glossy surface.
 
 use super::model::{Hit, Model, smooth_normals};
 use super::shade::{Colour, Light, gloss};
@@ -20,16 +20,16 @@ impl Model {
     }
 }
 
-/// Light from a liquid's surface: its own (`own`), the light from below that it transmits, and reflections.
+/// Light from a liquid's surface: its own (`surface`), the light from below that it transmits, and reflections.
 pub(super) fn shade_liquid(
     light: &Light,
     hit: &Hit,
     opacity: f64,
-    [own, below]: [Colour; 2],
+    [surface, below]: [Colour; 2],
     toward: DVec3,
     blocked: impl Fn(DVec3) -> bool,
 ) -> Colour {
-    let body = below.lerp(&own, opacity);
+    let body = below.lerp(&surface, opacity);
     let (reflectance, mirrored) = gloss(light, hit.normal, toward, blocked);
     let sheen = (opacity / FULL_SHEEN_OPACITY).min(1.0);
     body * (1.0 - reflectance * sheen) + mirrored * sheen

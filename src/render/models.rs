@@ -164,14 +164,14 @@ impl Models {
         let blocked = |direction| self.is_blocked(view.shadows.as_ref(), point, direction);
         let transmittance =
             |direction| if self.fogs.is_empty() { 1.0 } else { view.fogs.sunlight(point, direction) };
-        let own = shade(view.light, hit.normal, hit.albedo, sample, hit.wrap, blocked, transmittance);
-        let Some(opacity) = hit.opacity else { return own };
+        let surface = shade(view.light, hit.normal, hit.albedo, sample, hit.wrap, blocked, transmittance);
+        let Some(opacity) = hit.opacity else { return surface };
         if films == 0 || opacity >= 1.0 {
-            return shade_liquid(view.light, hit, 1.0, [own, own], toward, blocked);
+            return shade_liquid(view.light, hit, 1.0, [surface, surface], toward, blocked);
         }
         let behind = origin + toward * (hit.distance + hit.shadow_bias);
         let next = self.hit(behind, toward, None);
         let below = self.radiance(view, (behind, toward), next.as_ref(), sample, films - 1);
-        shade_liquid(view.light, hit, opacity, [own, below], toward, blocked)
+        shade_liquid(view.light, hit, opacity, [surface, below], toward, blocked)
     }
 }

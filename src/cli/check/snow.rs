@@ -30,8 +30,8 @@ pub fn run(args: &Args, session: &Session, mut scene: Scene) -> Result<(), Failu
     let too_much = report.mist.as_ref().and_then(|mist| mist.check(limit).err());
     report.warnings.extend(too_much.map(|error| error.to_string()));
     let free = args.free_space();
-    let of_mist = report.mist.as_ref().map_or(0, |mist| mist.disk_bytes);
-    let needed = report.disk_bytes.map(|bytes| bytes.saturating_add(of_mist));
+    let mist_bytes = report.mist.as_ref().map_or(0, |mist| mist.disk_bytes);
+    let needed = report.disk_bytes.map(|bytes| bytes.saturating_add(mist_bytes));
     warn_of_space(&mut report.warnings, "need about", needed, free);
     print(args, &report, || in_words(&report, limit, free))
 }
@@ -75,8 +75,9 @@ fn describe_grains(out: &mut String, report: &Report) {
 }
 
 fn describe_mist(out: &mut String, mist: &MistForecast, limit: u64) {
-    let of_million = |bytes: u64| size(1_000_000 * bytes);
-    let (memory, disk) = (of_million(mist.memory_bytes_per_cell), of_million(mist.disk_bytes_per_cell));
+    let size_of_million = |bytes: u64| size(1_000_000 * bytes);
+    let (memory, disk) =
+        (size_of_million(mist.memory_bytes_per_cell), size_of_million(mist.disk_bytes_per_cell));
     let _ = writeln!(
         out,
         "mist      cells of {:.6} m; a million take {memory} of memory, and {disk} in a frame's files",

@@ -14,12 +14,13 @@ const DENSITY: &str = "density";
 ///
 /// # Errors
 /// A file that cannot be read, or that holds none of these.
-pub fn of_vdb(path: &Path) -> frazil::Result<Vec<Part>> {
+pub fn parts_of_vdb(path: &Path) -> frazil::Result<Vec<Part>> {
     let grids = file::describe(path)?;
-    let of_type = |start: &'static str| grids.iter().filter(move |grid| grid.value_type.starts_with(start));
-    let floats = || of_type("Tree_float");
+    let grids_of_type =
+        |start: &'static str| grids.iter().filter(move |grid| grid.value_type.starts_with(start));
+    let floats = || grids_of_type("Tree_float");
     let fog = |grid| Part::Fog(path.to_path_buf(), grid);
-    if floats().next().is_none() && of_type("Tree_ptdataidx32").next().is_some() {
+    if floats().next().is_none() && grids_of_type("Tree_ptdataidx32").next().is_some() {
         if let Some(since) = changes_since(path)? {
             log::warn!("{}: {}", path.display(), partial(since));
         }

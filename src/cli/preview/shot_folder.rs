@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::grids::of_vdb;
+use super::grids::parts_of_vdb;
 use super::parts::{Folder, Part, points_of};
 use frazil::io::mesh::{self, extension};
 use frazil::scene::run::DoneFrames;
@@ -110,7 +110,7 @@ impl Folder for ShotFolder {
             None => {}
         }
         if mist.is_some() {
-            parts.extend(of_vdb(&self.mist.file(frame, STAGES[2].0)?)?);
+            parts.extend(parts_of_vdb(&self.mist.file(frame, STAGES[2].0)?)?);
         }
         for (stored, (stage, _), file) in
             [(&self.objects, STAGES[3], objects), (&self.surface, STAGES[4], surface)]

@@ -8,7 +8,7 @@ use frazil::motion::{Character, Play, is_gltf};
 use frazil::{Context, Error, Result, io};
 
 #[cfg(feature = "vdb")]
-use super::grids::of_vdb;
+use super::grids::parts_of_vdb;
 use super::parts::{Folder, Part, points_of};
 use super::shallow_folder::ShallowFolder;
 #[cfg(feature = "vdb")]
@@ -166,7 +166,7 @@ fn read_file(path: &Path, clip: Option<&str>, frame: Option<f64>, fps: f64) -> R
     let without_data = |mesh: TriMesh| DetailedMesh { mesh, ..DetailedMesh::default() };
     let mesh = match io::mesh::extension(path).as_str() {
         #[cfg(feature = "vdb")]
-        "vdb" => return of_vdb(path),
+        "vdb" => return parts_of_vdb(path),
         #[cfg(not(feature = "vdb"))]
         "vdb" => return crate::cli::needs_openvdb(path),
         "ply" if io::particles::ply::holds_points(path)? => return Ok(vec![points_of(path)?]),

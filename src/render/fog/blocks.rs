@@ -271,9 +271,9 @@ impl Fog {
         let samples = &self.samples[self.blocks[block].samples as usize];
         let [x, y, z] =
             local.map(|at| (at - reach + 1).max(0) as usize..=((at + reach - 1) as usize).min(DIM));
-        let of_row = |x: usize, y: usize| samples[(x * EDGE + y) * EDGE..][z.clone()].iter().copied();
-        let of_slice = |x: usize| y.clone().flat_map(move |y| of_row(x, y)).fold(0.0, f32::max);
-        x.map(of_slice).fold(0.0, f32::max)
+        let row = |x: usize, y: usize| samples[(x * EDGE + y) * EDGE..][z.clone()].iter().copied();
+        let slice_max = |x: usize| y.clone().flat_map(move |y| row(x, y)).fold(0.0, f32::max);
+        x.map(slice_max).fold(0.0, f32::max)
     }
 
     /// Whether it has no density above 0 anywhere.

@@ -41,7 +41,7 @@ pub(in crate::render) struct LitFogs<'a> {
     /// Unit vector towards the sun.
     pub(super) sun: DVec3,
     /// For each fog and block the index of its lattice.
-    of_block: Vec<Vec<u32>>,
+    block_lattices: Vec<Vec<u32>>,
     /// The first one is for dark blocks.
     lattices: Vec<Lattice>,
 }
@@ -61,7 +61,7 @@ impl<'a> LitFogs<'a> {
         let all: Vec<(usize, usize)> = fogs
             .iter()
             .enumerate()
-            .flat_map(|(fog, of)| (0..of.blocks().len()).map(move |block| (fog, block)))
+            .flat_map(|(fog, lit_fog)| (0..lit_fog.blocks().len()).map(move |block| (fog, block)))
             .collect();
         let light = |(fog, block): &(usize, usize)| {
             ctx.check()?;
@@ -71,12 +71,12 @@ impl<'a> LitFogs<'a> {
         let dark = Lit { sun: 0.0, unblocked: 0.0, sky: MIN_SKY };
         let mut lattices = Vec::with_capacity(1 + lit.iter().flatten().count());
         lattices.push([dark; EDGE * EDGE * EDGE]);
-        let mut of_block: Vec<Vec<u32>> = vec![Vec::new(); fogs.len()];
+        let mut block_lattices: Vec<Vec<u32>> = vec![Vec::new(); fogs.len()];
         for ((fog, _), lattice) in all.iter().zip(lit) {
-            of_block[*fog].push(if lattice.is_some() { lattices.len() as u32 } else { 0 });
+            block_lattices[*fog].push(if lattice.is_some() { lattices.len() as u32 } else { 0 });
             lattices.extend(lattice.map(|lattice| *lattice));
         }
-        Ok(Self { fogs, sun, of_block, lattices })
+        Ok(Self { fogs, sun, block_lattices, lattices })
     }
 
     /// Share of the sun's light, 0 to 1, that the fogs transmit to a point (m); `toward` is the direction of the sun (a unit vector).
@@ -88,7 +88,7 @@ impl<'a> LitFogs<'a> {
     /// The light at a position.
     #[inline]
     pub(super) fn at(&self, position: FogPosition) -> Lit {
-        let lattice = &self.lattices[self.of_block[position.fog][position.block] as usize];
+        let lattice = &self.lattices[self.block_lattices[position.fog][position.block] as usize];
         let scaled = position.local.map(|at| at / SPACING as f32);
         let whole = scaled.map(|at| (at as usize).min(EDGE - 2));
         let [x, y, z] = [0, 1, 2].map(|axis| scaled[axis] - whole[axis] as f32);
@@ -112,16 +112,16 @@ fn lattice(
     sun: DVec3,
     blocked: &impl Fn(DVec3, DVec3) -> bool,
 ) -> Option<Box<Lattice>> {
-    let of = &fogs[fog];
-    let corner = DVec3::from(of.blocks()[block].origin.map(f64::from));
+    let lit_fog = &fogs[fog];
+    let corner = DVec3::from(lit_fog.blocks()[block].origin.map(f64::from));
     // Shadow rays start slightly off the point, so that fog on the ground is not in the ground's shadow.
-    let shadow_bias = sun * (SPACING as f64 * of.placement().cell());
+    let shadow_bias = sun * (SPACING as f64 * lit_fog.placement().cell());
     let lit = |n: usize| {
         let voxel = [n / (EDGE * EDGE), n / EDGE % EDGE, n % EDGE].map(|at| (at * SPACING) as i32);
-        let point = of.placement().to_world(corner + DVec3::from(voxel.map(f64::from)));
+        let point = lit_fog.placement().to_world(corner + DVec3::from(voxel.map(f64::from)));
         let sun_left = transmittance(fogs, point, sun);
         // Where there is no fog around, only [`LitFogs::sunlight`] asks for light.
-        let is_visible = sun_left > DARK && of.max_near(block, voxel, SPACING as i32) > 0.0;
+        let is_visible = sun_left > DARK && lit_fog.max_near(block, voxel, SPACING as i32) > 0.0;
         let unblocked = if is_visible && blocked(point + shadow_bias, sun) { 0.0 } else { 1.0 };
         Lit { sun: sun_left, unblocked, sky: transmittance(fogs, point, DVec3::y()) }
     };

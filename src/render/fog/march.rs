@@ -19,7 +19,7 @@ const MULTIPLE_SCATTERING: f64 = 0.9;
 /// A fog that transmits less than this is opaque.
 const OPAQUE: f64 = 0.002;
 
-/// Effect of fog on what is behind it at some distance.
+/// Effect of the fog along a ray up to some distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::render) struct Veil {
     /// Share of the light that passes, 0 to 1.

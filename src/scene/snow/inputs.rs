@@ -330,14 +330,17 @@ fn layer_grid(path: &Path, cell: f64, input_hashes: &InputHashes) -> Result<Floa
     if grid.class() != GridClass::LevelSet {
         return Err(Error::file(path, format!("grid \"{}\" is not a level set", grid.name())));
     }
-    let own = grid.voxel_size();
-    if (own - cell).abs() > 1e-6 * cell {
-        return Err(Error::file(path, format!("the layer has cells of {own} m, but `cell` is {cell} m")));
+    let own_cell = grid.voxel_size();
+    if (own_cell - cell).abs() > 1e-6 * cell {
+        return Err(Error::file(
+            path,
+            format!("the layer has cells of {own_cell} m, but `cell` is {cell} m"),
+        ));
     }
     if let Some(what) = distances::warning(&grid)? {
         return Err(Error::file(path, format!("grid \"{}\" {what}", grid.name())));
     }
-    if f64::from(grid.background()) < 2.999 * own {
+    if f64::from(grid.background()) < 2.999 * own_cell {
         return Err(Error::file(path, "the layer's narrow band is less than 3 cells wide"));
     }
     Ok(grid)
@@ -358,7 +361,7 @@ fn motion(
         turn: radians(key.turn_deg),
     });
     let keys = Keys::new(keys.collect())?.with_ease(object.ease);
-    let own: Box<dyn Motion> = match Pattern::parse(&object.file) {
+    let file_motion: Box<dyn Motion> = match Pattern::parse(&object.file) {
         None if is_gltf(&object.file) => Box::new(character(scene, object, input_hashes)?),
         None => {
             let polygons = mesh::parse_polygons_from(
@@ -384,17 +387,17 @@ fn motion(
         }
     };
     let mut pose = Vec::new();
-    own.pose(scene.shot.time(scene.shot.frames.first), &mut pose)?;
+    file_motion.pose(scene.shot.time(scene.shot.frames.first), &mut pose)?;
     // Meshes are read minus the origin.
     let space = if is_gltf(&object.file) { object.space } else { object.space.without_origin() };
     pose.iter_mut().for_each(|position| *position -= space.origin);
     let name = object.file.display().to_string();
     warnings.extend(too_far_warning(&name, farthest(pose.iter()), space.scale, scene.snow()?.cell, BY_KEY));
     if scene.output.objects_usd || scene.output.objects_ply {
-        let missing = own.drawn().uvs.map_or(0, |uvs| uvs.missing);
+        let missing = file_motion.drawn().uvs.map_or(0, |uvs| uvs.missing);
         warnings.extend((missing > 0).then(|| missing_uvs(&name, missing)));
     }
-    Ok(Box::new(Placed::new(own, space, keys)))
+    Ok(Box::new(Placed::new(file_motion, space, keys)))
 }
 
 fn character(scene: &Scene, object: &Object, input_hashes: &InputHashes) -> Result<Character> {

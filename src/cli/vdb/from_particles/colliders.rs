@@ -78,7 +78,7 @@ impl Collider {
             self.solids = grids.into_iter().map(solid).collect::<Result<_>>()?;
         }
         for solid in &mut self.solids {
-            // The cuts before may have left nothing.
+            // Earlier cuts may have removed all of the liquid.
             let Some((low, high)) = liquid.active_bbox() else { return Ok(()) };
             let solid = solid.within(ctx, [low, high], cell)?;
             ctx.phase("subtract", || difference(ctx, liquid, solid))?;

@@ -79,14 +79,14 @@ pub fn estimate(scene: &Scene, inputs: &Inputs) -> u64 {
 
 /// Bytes of a frame's volumes and meshes of the base.
 fn of_volumes(scene: &Scene, inputs: &Inputs) -> f64 {
-    let (asked, whole) = (scene.output.volumes, whole_base(inputs));
+    let (volumes, whole) = (scene.output.volumes, whole_base(inputs));
     let columns = whole / BYTES_PER_COLUMN;
-    let is_fine = Needs::of(asked, &scene.values).grains;
+    let is_fine = Needs::of(volumes, &scene.values).grains;
     let fine = if is_fine { memory::division(scene, inputs) as f64 } else { 1.0 };
-    f64::from(asked.fog_base) * whole * FOG_SHARE
-        + f64::from(asked.snow) * whole * fine * fine
-        + f64::from(asked.mesh_ply) * columns * MESH_PLY
-        + f64::from(asked.mesh_usd) * columns * MESH_USDA
+    f64::from(volumes.fog_base) * whole * FOG_SHARE
+        + f64::from(volumes.snow) * whole * fine * fine
+        + f64::from(volumes.mesh_ply) * columns * MESH_PLY
+        + f64::from(volumes.mesh_usd) * columns * MESH_USDA
 }
 
 /// Bytes of a whole base file: by its columns, or by the leaves of a layer given as a level set.

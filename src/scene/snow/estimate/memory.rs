@@ -43,18 +43,18 @@ pub fn estimate(scene: &Scene, inputs: &Inputs) -> Result<u64> {
 /// # Errors
 /// As [`estimate`].
 pub(in crate::scene::snow) fn of_volumes(scene: &Scene, inputs: &Inputs, grains: u64) -> Result<u64> {
-    let asked = scene.output.volumes;
-    let needs = Needs::of(asked, &scene.values);
+    let volumes = scene.output.volumes;
+    let needs = Needs::of(volumes, &scene.values);
     let layer = layer(inputs)?;
     let columns = layer / BYTES_PER_COLUMN;
     let fine = if needs.grains { division(scene, inputs) as f64 } else { 1.0 };
     let base = f64::from(needs.base) * layer
-        + f64::from(asked.fog_base) * layer
-        + f64::from(asked.snow) * layer * fine * fine
-        + f64::from(asked.mesh()) * columns * BYTES_PER_MESH_COLUMN;
+        + f64::from(volumes.fog_base) * layer
+        + f64::from(volumes.snow) * layer * fine * fine
+        + f64::from(volumes.mesh()) * columns * BYTES_PER_MESH_COLUMN;
     let each = u64::from(needs.grains) * BYTES_PER_POINT
-        + u64::from(asked.fog_grains) * BYTES_PER_FOG_GRAIN
-        + u64::from(needs.grains && asked.snow) * BYTES_PER_UNITED_GRAIN;
+        + u64::from(volumes.fog_grains) * BYTES_PER_FOG_GRAIN
+        + u64::from(needs.grains && volumes.snow) * BYTES_PER_UNITED_GRAIN;
     let has_volumes = needs.base || needs.grains;
     Ok(if has_volumes { (base + FIXED) as u64 + grains * each } else { 0 })
 }

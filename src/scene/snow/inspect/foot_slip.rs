@@ -43,22 +43,22 @@ pub(in crate::scene::snow) fn foot_slip(
         return Ok(None);
     }
     let play = Play { node: object.node.clone(), clip: object.clip.clone(), repeat: false, start: 0.0 };
-    let own = Character::open(&object.file, play)?;
-    let round = own.duration();
-    let own = Placed::new(Box::new(own), object.space, Keys::default());
-    let Some(own) = gait(&own, 0.0, round)?.filter(|gait| gait.is_steady()) else { return Ok(None) };
+    let clip = Character::open(&object.file, play)?;
+    let round = clip.duration();
+    let clip = Placed::new(Box::new(clip), object.space, Keys::default());
+    let Some(clip_gait) = gait(&clip, 0.0, round)?.filter(|gait| gait.is_steady()) else { return Ok(None) };
     let frames = scene.shot.frames;
     let start = scene.shot.time(frames.first);
     let end = (start + round).min(scene.shot.time(frames.last));
-    let Some(carried) = gait(moved, start, end)? else { return Ok(None) };
-    let (speed, slips) = (own.velocity.norm(), carried.velocity.norm());
+    let Some(moved_gait) = gait(moved, start, end)? else { return Ok(None) };
+    let (speed, slips) = (clip_gait.velocity.norm(), moved_gait.velocity.norm());
     Ok(Some(FootSlip {
-        carry_m_per_s: own.carry().into(),
+        carry_m_per_s: clip_gait.carry().into(),
         stride_m: speed * round,
         round_s: round,
-        standing: own.standing,
+        standing: clip_gait.standing,
         slips_m_per_s: slips,
-        keys: keys(scene, object, own.carry())?,
+        keys: keys(scene, object, clip_gait.carry())?,
         slips: slips > MIN_SLIP && slips > MIN_SHARE * speed,
     }))
 }

@@ -18,11 +18,11 @@ pub struct Needs {
 
 impl Needs {
     /// The stages for a scene.
-    pub fn of(asked: VolumesOutput, values: &Values) -> Self {
+    pub fn of(volumes: VolumesOutput, values: &Values) -> Self {
         Self {
-            base: asked.fog_base || asked.snow || asked.mesh(),
-            grains: asked.fog_grains || asked.snow && has_grains(values),
-            mist: asked.fog_mist,
+            base: volumes.fog_base || volumes.snow || volumes.mesh(),
+            grains: volumes.fog_grains || volumes.snow && has_grains(values),
+            mist: volumes.fog_mist,
         }
     }
 }
@@ -32,15 +32,15 @@ impl Needs {
 /// # Errors
 /// A stage that the scene does not have; files that are not written.
 pub fn check_volumes(table: &Table, values: &Values, output: &Output) -> Result<()> {
-    let asked = output.volumes;
-    let needs = Needs::of(asked, values);
-    if asked.fog_grains && !has_grains(values) {
+    let volumes = output.volumes;
+    let needs = Needs::of(volumes, values);
+    if volumes.fog_grains && !has_grains(values) {
         return Err(table.error("fog", "names \"grains\", but the scene has no table [grains]"));
     }
-    if asked.fog_mist && !has_mist(values) {
+    if volumes.fog_mist && !has_mist(values) {
         return Err(table.error("fog", "names \"mist\", but the scene has no table [mist]"));
     }
-    let reader = match (asked.fog(), asked.snow) {
+    let reader = match (volumes.fog(), volumes.snow) {
         (true, _) => "fog",
         (false, true) => "snow",
         (false, false) => "mesh",

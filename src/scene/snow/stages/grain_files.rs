@@ -155,7 +155,7 @@ fn changes(before: &Points, after: &Points) -> (Points, Vec<i64>) {
 /// `before`, to 0, which compresses well.
 fn set_birth_attributes(points: &mut Points, before: Option<&Points>, old_indices: &[Option<usize>]) {
     fn values_at_birth<T: Copy + Default>(
-        own: &Column<T>,
+        current: &Column<T>,
         before: Option<&Column<T>>,
         old_indices: &[Option<usize>],
     ) -> Column<T> {
@@ -164,20 +164,20 @@ fn set_birth_attributes(points: &mut Points, before: Option<&Points>, old_indice
             old_indices
                 .iter()
                 .enumerate()
-                .map(|(point, old_index)| old_index.map_or_else(|| own.get(point), old))
+                .map(|(point, old_index)| old_index.map_or_else(|| current.get(point), old))
                 .collect(),
         )
     }
     for name in ["source_frame", "rest"] {
         let values = match (points.attribute(name), before.and_then(|before| before.attribute(name))) {
-            (Some(Values::Int(own)), Some(Values::Int(before))) => {
-                Values::Int(values_at_birth(own, Some(before), old_indices))
+            (Some(Values::Int(current)), Some(Values::Int(before))) => {
+                Values::Int(values_at_birth(current, Some(before), old_indices))
             }
-            (Some(Values::Int(own)), _) => Values::Int(values_at_birth(own, None, old_indices)),
-            (Some(Values::Vector(own)), Some(Values::Vector(before))) => {
-                Values::Vector(values_at_birth(own, Some(before), old_indices))
+            (Some(Values::Int(current)), _) => Values::Int(values_at_birth(current, None, old_indices)),
+            (Some(Values::Vector(current)), Some(Values::Vector(before))) => {
+                Values::Vector(values_at_birth(current, Some(before), old_indices))
             }
-            (Some(Values::Vector(own)), _) => Values::Vector(values_at_birth(own, None, old_indices)),
+            (Some(Values::Vector(current)), _) => Values::Vector(values_at_birth(current, None, old_indices)),
             _ => continue,
         };
         points.set(name, values);
@@ -360,17 +360,17 @@ impl GrainReader {
             if let Some((_, points)) = self.last.take_if(|(last, _)| *last == at && at < frame) {
                 break points;
             }
-            let (points, of_file) = read(stored, at)?;
-            let record = previous_record(at, &of_file).map_err(|error| in_frame(stored, at, error))?;
-            metadata.get_or_insert(of_file);
+            let (points, file_metadata) = read(stored, at)?;
+            let record = previous_record(at, &file_metadata).map_err(|error| in_frame(stored, at, error))?;
+            metadata.get_or_insert(file_metadata);
             match record {
                 None => break points,
-                Some((gone, of)) => later.push((at, points, gone, of)),
+                Some((gone, before_hash)) => later.push((at, points, gone, before_hash)),
             }
             at -= 1;
         };
-        for (at, changed, gone, of) in later.into_iter().rev() {
-            if of.is_some_and(|of| of != hash_of(&points)) {
+        for (at, changed, gone, before_hash) in later.into_iter().rev() {
+            if before_hash.is_some_and(|before_hash| before_hash != hash_of(&points)) {
                 return Err(in_frame(stored, at, Error::argument("holds changes of other grains")));
             }
             points = apply_changes(points, changed, &gone).map_err(|error| in_frame(stored, at, error))?;
@@ -463,11 +463,11 @@ mod tests {
             sizes,
             [(3, none()), (3, none()), (0, vec![0, 3]), (1, none()), (0, vec![1, 4]), (1, none())]
         );
-        let there = || points(&[(1, 0.0, false), (2, 0.0, false), (4, 0.0, false)]);
+        let before_grains = || points(&[(1, 0.0, false), (2, 0.0, false), (4, 0.0, false)]);
         for (held, gone) in
             [(&[][..], 3..=3), (&[], 2..=4), (&[], 1..=ID_END - 1), (&[(2, 1.0, false)], 1..=2)]
         {
-            assert!(apply_changes(there(), points(held), &[gone]).is_err());
+            assert!(apply_changes(before_grains(), points(held), &[gone]).is_err());
         }
     }
 

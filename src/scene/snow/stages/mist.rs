@@ -75,20 +75,20 @@ impl Mist<'_> {
         stored: &DoneFrames,
         frame: i32,
     ) -> Result<Vec<Source>> {
-        let of_frame =
+        let with_frame =
             |frame: i32, error| Error::file(stored.folder(), format!("frame {frame} of grains {error}"));
         let State { mist, grains, starts: cached, .. } = state;
         let starts = match cached.take() {
             Some((at, starts)) if at == frame - 1 => starts,
             _ => {
                 let (before, _) = grains.points(ctx, stored, frame - 1)?;
-                starts_of(before).map_err(|error| of_frame(frame - 1, error))?
+                starts_of(before).map_err(|error| with_frame(frame - 1, error))?
             }
         };
         let (points, _) = grains.points(ctx, stored, frame)?;
         let sources = sources_of(points, &starts, frame, mist.params());
-        let sources = sources.map_err(|error| of_frame(frame, error))?;
-        *cached = Some((frame, starts_of(points).map_err(|error| of_frame(frame, error))?));
+        let sources = sources.map_err(|error| with_frame(frame, error))?;
+        *cached = Some((frame, starts_of(points).map_err(|error| with_frame(frame, error))?));
         Ok(sources)
     }
 

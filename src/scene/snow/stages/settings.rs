@@ -25,7 +25,7 @@ pub(in crate::scene::snow) fn of_base(scene: &Scene, input_hashes: &InputHashes)
     Ok(settings)
 }
 
-/// The settings of a stage that depends on all objects, on the ground and on a file of its own, given with its key.
+/// The settings of a stage that depends on all objects, on the ground and on `file`, which is given with its key.
 ///
 /// # Errors
 /// An input that cannot be read.
@@ -33,12 +33,12 @@ pub(in crate::scene::snow) fn of_stage(
     scene: &Scene,
     stage: &str,
     input_hashes: &InputHashes,
-    own: Option<(&'static str, &Path)>,
+    file: Option<(&'static str, &Path)>,
 ) -> Result<Settings> {
     let mut settings =
         settings_of(scene, stage, input_hashes, &[&Role::MOVING[..], &[Role::Static]].concat())?;
     let files = scene.snow.iter().flat_map(|snow| snow.files()).map(|(key, path)| (key, path.as_path()));
-    for (key, path) in files.filter(|(key, _)| *key == "snow.ground").chain(own) {
+    for (key, path) in files.filter(|(key, _)| *key == "snow.ground").chain(file) {
         settings.insert(key.into(), format!("{CONTENT}{}", input_hashes.hash(path)?));
     }
     Ok(settings)

@@ -31,7 +31,7 @@ use crate::vdb::{FloatGrid, level_set};
 pub struct Volumes<'a> {
     scene: &'a Scene,
     inputs: &'a Inputs,
-    asked: VolumesOutput,
+    output: VolumesOutput,
     needs: Needs,
 }
 
@@ -60,8 +60,8 @@ const MESH: &str = "base";
 impl<'a> Volumes<'a> {
     /// The stage for a scene.
     pub fn new(scene: &'a Scene, inputs: &'a Inputs) -> Self {
-        let asked = scene.output.volumes;
-        Self { scene, inputs, asked, needs: Needs::of(asked, &scene.values) }
+        let output = scene.output.volumes;
+        Self { scene, inputs, output, needs: Needs::of(output, &scene.values) }
     }
 
     /// The frames of an upstream stage.
@@ -90,17 +90,17 @@ impl<'a> Volumes<'a> {
 
     /// Makes the grids of the fog.
     fn fog(&self, ctx: &Context, source: &mut Source<'_>) -> Result<Vec<FloatGrid>> {
-        let names = fog_names(self.asked);
+        let names = fog_names(self.output);
         let mut grids = Vec::new();
         let mut add = |mut grid: FloatGrid, name: Option<&str>| {
             grid.set_name(name.unwrap_or_default())?;
             grids.push(grid);
             Ok::<(), Error>(())
         };
-        if let Some(surface) = source.base.filter(|_| self.asked.fog_base) {
+        if let Some(surface) = source.base.filter(|_| self.output.fog_base) {
             add(fog::base(ctx, surface)?, names[0])?;
         }
-        if let Some(points) = source.grains.filter(|_| self.asked.fog_grains) {
+        if let Some(points) = source.grains.filter(|_| self.output.fog_grains) {
             let radius = self.radius();
             add(fog::grains(ctx, &positions(points, |_| true), radius, fog::VOXEL * radius)?, names[1])?;
         }
@@ -136,7 +136,7 @@ impl<'a> Volumes<'a> {
         let (mut files, mut results) = (Files::new(), Map::new());
         let metadata = metadata(self.scene, source.frame, made_from);
         let options = WriteOptions { metadata, ..WriteOptions::default() };
-        if self.asked.fog() {
+        if self.output.fog() {
             let grids = ctx.phase("fog", || self.fog(ctx, source))?;
             let voxels: u64 = grids.iter().map(FloatGrid::active_voxels).sum();
             results.insert("fog_voxels".into(), json!(voxels));
@@ -146,12 +146,12 @@ impl<'a> Volumes<'a> {
             files.push(("fog", "vdb", ctx.phase("pack", || to_bytes(&grids, &options))?));
         }
         let Some(surface) = source.base else { return Ok((files, results)) };
-        if self.asked.snow {
+        if self.output.snow {
             let grid = ctx.phase("snow", || self.snow(ctx, surface, source.grains))?;
             results.insert("snow_voxels".into(), json!(grid.active_voxels()));
             files.push(("snow", "vdb", ctx.phase("pack", || to_bytes(&[&grid], &options))?));
         }
-        if self.asked.mesh() {
+        if self.output.mesh() {
             let mesh = ctx.phase("mesh", || level_set::to_mesh(ctx, surface, 0.0, 0.0))?;
             results.insert("mesh_triangles".into(), json!(mesh.triangles.len()));
             files.extend(ctx.phase("pack", || Ok(self.mesh_files(&mesh, source.frame)))?);
@@ -162,10 +162,10 @@ impl<'a> Volumes<'a> {
     /// The files of the base's surface.
     fn mesh_files(&self, surface: &TriMesh, frame: i32) -> Files {
         let (mut files, carried) = (Files::new(), mesh::Carried::default());
-        if self.asked.mesh_ply {
+        if self.output.mesh_ply {
             files.push(("mesh", "ply", mesh::ply_bytes(surface, &carried)));
         }
-        if self.asked.mesh_usd {
+        if self.output.mesh_usd {
             let mesh = usd::MeshFrame::of(MESH, surface, &carried);
             let text = usd::clip("mesh", frame, self.scene.shot.fps, usd::Units::OWN, &[mesh]);
             files.push(("mesh", "usda", text.into_bytes()));
@@ -180,10 +180,10 @@ fn positions(points: &Points, is_wanted: impl Fn(usize) -> bool) -> Vec<DVec3> {
 }
 
 /// Names of the fog's grids of base, grains and mist. A single one has the name that smoke shaders look for.
-fn fog_names(asked: VolumesOutput) -> [Option<&'static str>; 3] {
-    let parts = [(asked.fog_base, "base"), (asked.fog_grains, "grains"), (asked.fog_mist, "mist")];
-    let is_alone = parts.iter().filter(|(is_asked, _)| *is_asked).count() == 1;
-    parts.map(|(is_asked, name)| is_asked.then_some(if is_alone { "density" } else { name }))
+fn fog_names(output: VolumesOutput) -> [Option<&'static str>; 3] {
+    let parts = [(output.fog_base, "base"), (output.fog_grains, "grains"), (output.fog_mist, "mist")];
+    let is_alone = parts.iter().filter(|(is_wanted, _)| *is_wanted).count() == 1;
+    parts.map(|(is_wanted, name)| is_wanted.then_some(if is_alone { "density" } else { name }))
 }
 
 impl Stage for Volumes<'_> {
@@ -201,9 +201,9 @@ impl Stage for Volumes<'_> {
 
     fn writes(&self, kind: &str) -> bool {
         match kind {
-            "fog" => self.asked.fog(),
-            "snow" => self.asked.snow,
-            _ => self.asked.mesh(),
+            "fog" => self.output.fog(),
+            "snow" => self.output.snow,
+            _ => self.output.mesh(),
         }
     }
 
@@ -237,7 +237,7 @@ impl Stage for Volumes<'_> {
     }
 
     fn usd_kind(&self) -> Option<&'static str> {
-        self.asked.mesh_usd.then_some("mesh")
+        self.output.mesh_usd.then_some("mesh")
     }
 
     fn volumes(&self) -> Vec<Volume> {
@@ -252,21 +252,21 @@ impl Stage for Volumes<'_> {
             ("fog_grains", [&density("density", SNOW_SCALE), &density("grains", SNOW_SCALE)]),
             ("fog_mist", [&density("density", 1.0), &density("mist", 1.0)]),
         ];
-        let of_part = |(name, (prim, [alone, own])): (Option<&str>, Part)| {
-            let fields = if name? == "density" { alone } else { own };
+        let volume_of = |(name, (prim, [alone, several])): (Option<&str>, Part)| {
+            let fields = if name? == "density" { alone } else { several };
             Some(Volume { kind: "fog", prim, fields, is_guide: false })
         };
-        let fog = fog_names(self.asked).into_iter().zip(PARTS).filter_map(of_part);
+        let fog = fog_names(self.output).into_iter().zip(PARTS).filter_map(volume_of);
         const SURFACE: &[Field] = &[Field::of("surface", Holds::Distance)];
         let snow = Volume { kind: "snow", prim: "snow", fields: SURFACE, is_guide: false };
-        fog.chain(self.asked.snow.then_some(snow)).collect()
+        fog.chain(self.output.snow.then_some(snow)).collect()
     }
 
     fn clip(&self) -> Option<Clips<'_>> {
         // A different mesh at each frame, without velocities.
         let (name, primvars) = (MESH.into(), Vec::new());
         let mesh = MeshPrim { name, look: Look::Snow, moves: false, uvs: None, primvars };
-        self.asked.mesh_usd.then(|| Clips::new("mesh", ClipPrims::Meshes(vec![mesh])))
+        self.output.mesh_usd.then(|| Clips::new("mesh", ClipPrims::Meshes(vec![mesh])))
     }
 }
 
@@ -293,8 +293,8 @@ impl Stepping for Volumes<'_> {
         let Some(made_from) = to.made_from else {
             return Ok(Stepped { step: Files::new(), report: Report::default() });
         };
-        let asked = [self.asked.fog(), self.asked.snow, self.asked.mesh()];
-        let phases = 1 + 2 * asked.iter().filter(|is_asked| **is_asked).count();
+        let wanted = [self.output.fog(), self.output.snow, self.output.mesh()];
+        let phases = 1 + 2 * wanted.iter().filter(|is_wanted| **is_wanted).count();
         let work = || {
             let mut source = ctx.phase("read", || self.read(ctx, state, to))?;
             self.make(ctx, &mut source, made_from)

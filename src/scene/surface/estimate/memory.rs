@@ -298,7 +298,7 @@ mod tests {
         let finer = of(&detail) - plain;
         let expected = 3000.0 * REBUILT[0] + 6000.0 * (REBUILT[1] + MISMATCH * CUT[2]);
         assert!((finer - expected).abs() < 1.0, "{finer} is not {expected}");
-        // The first mesh's tree; when Gamma is freed, the transfer takes little, but more for a million numbers.
+        // Few numbers add only the first mesh's tree, as their transfer takes less than Gamma; a million add more.
         let array = |count: usize| MeshArray {
             name: "mask".into(),
             on: On::Vertices,

@@ -199,11 +199,11 @@ pub(super) fn all_files(scene: &Scene, surface: &Surface) -> Vec<PathBuf> {
 /// particles' own surface lies half a spacing above the outermost ones: for thin sheets and small drops it encloses more than the
 /// particles' volume.
 fn volume_warning(mesh: &TriMesh, particles: usize, spacing: f64) -> Option<String> {
-    let (own, liquid) = (mesh.volume(), particles as f64 * spacing.powi(3));
-    let is_mismatch = own < liquid / MAX_RATIO || own > MAX_RATIO * liquid + mesh.area() * spacing;
+    let (volume, liquid) = (mesh.volume(), particles as f64 * spacing.powi(3));
+    let is_mismatch = volume < liquid / MAX_RATIO || volume > MAX_RATIO * liquid + mesh.area() * spacing;
     (mesh.is_closed() && is_mismatch).then(|| {
         format!(
-            "the mesh holds {own:.4} m3, and the first frame's {particles} particles {liquid:.4} m3: are both in the same unit?"
+            "the mesh holds {volume:.4} m3, and the first frame's {particles} particles {liquid:.4} m3: are both in the same unit?"
         )
     })
 }

@@ -100,20 +100,20 @@ fn conformed(edited: DetailedMesh, first: &DetailedMesh) -> (DetailedMesh, Vec<S
     let (vertices, faces) = (mesh.positions.len(), mesh.triangles.len());
     let (mut missing, mut faults): (Vec<&str>, Vec<String>) = (Vec::new(), Vec::new());
     let mut taken = Vec::with_capacity(first.arrays.len());
-    for own in &first.arrays {
-        let found = arrays.iter().find(|array| array.name == own.name && array.on == own.on);
+    for wanted in &first.arrays {
+        let found = arrays.iter().find(|array| array.name == wanted.name && array.on == wanted.on);
         let values = match found {
-            Some(array) => converted(array, own.number),
+            Some(array) => converted(array, wanted.number),
             None => {
-                missing.push(&own.name);
-                vec![0.0; own.on.count(vertices, faces)]
+                missing.push(&wanted.name);
+                vec![0.0; wanted.on.count(vertices, faces)]
             }
         };
-        taken.push(MeshArray { name: own.name.clone(), on: own.on, number: own.number, values });
+        taken.push(MeshArray { name: wanted.name.clone(), on: wanted.on, number: wanted.number, values });
     }
     // Detail retention is used even if the first mesh has no such array.
     let is_used = |array: &MeshArray| {
-        let is_known = first.arrays.iter().any(|own| own.name == array.name);
+        let is_known = first.arrays.iter().any(|wanted| wanted.name == array.name);
         is_known || array.name == "detail" && array.on == On::Vertices
     };
     let mut ignored: Vec<&str> =
@@ -125,11 +125,11 @@ fn conformed(edited: DetailedMesh, first: &DetailedMesh) -> (DetailedMesh, Vec<S
             None
         }
         (None, None) => None,
-        (None, Some(own)) => {
+        (None, Some(first_uvs)) => {
             missing.push("texture coordinates");
-            Some(Uvs::zeros(own.corners.is_some(), vertices, faces))
+            Some(Uvs::zeros(first_uvs.corners.is_some(), vertices, faces))
         }
-        (Some(uvs), Some(own)) => match (&uvs.corners, own.corners.is_some()) {
+        (Some(uvs), Some(first_uvs)) => match (&uvs.corners, first_uvs.corners.is_some()) {
             (None, true) => {
                 let corners = mesh.triangles.as_flattened().to_vec();
                 Some(Uvs { corners: Some(corners), ..uvs })
@@ -190,11 +190,11 @@ fn by_vertex(
     triangles: &[[u32; 3]],
     vertices: usize,
 ) -> Vec<[f32; 2]> {
-    let mut own: Vec<Option<[f32; 2]>> = vec![None; vertices];
+    let mut first: Vec<Option<[f32; 2]>> = vec![None; vertices];
     for (vertex, index) in triangles.as_flattened().iter().zip(corners) {
-        own[*vertex as usize].get_or_insert(coordinates[*index as usize]);
+        first[*vertex as usize].get_or_insert(coordinates[*index as usize]);
     }
-    own.into_iter().map(Option::unwrap_or_default).collect()
+    first.into_iter().map(Option::unwrap_or_default).collect()
 }
 
 #[cfg(test)]

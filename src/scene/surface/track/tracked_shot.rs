@@ -320,10 +320,10 @@ impl<'a> TrackedShot<'a> {
             let targets = EasingTargets::of(ctx, change, &triangles, self.inputs.spacing)?;
             tracked.easing = std::mem::take(&mut tracked.easing).then(&targets);
         }
-        let own = tracked.detail.as_deref().unwrap_or(&self.inputs.mesh);
+        let data = tracked.detail.as_deref().unwrap_or(&self.inputs.mesh);
         tracked.detail = Some(Arc::new(match tracked.tracker.vertices() {
-            [] => own.emptied(),
-            _ => carry_data(ctx, own, &tracked.source, (&tracked.tracker, change), particles)?,
+            [] => data.emptied(),
+            _ => carry_data(ctx, data, &tracked.source, (&tracked.tracker, change), particles)?,
         }));
         Ok(())
     }
@@ -407,14 +407,14 @@ impl Source {
 /// The data that a mesh carries after a change, without positions.
 fn carry_data(
     ctx: &Context,
-    own: &DetailedMesh,
+    data: &DetailedMesh,
     source: &Source,
     (tracker, change): (&Tracker, &Change),
     particles: &Particles,
 ) -> Result<DetailedMesh> {
-    let triangles = own.mesh.triangles.clone();
+    let triangles = data.mesh.triangles.clone();
     let mesh = TriMesh { positions: usd::to_floats(&change.before), triangles };
-    let old = DetailedMesh { mesh, uvs: own.uvs.clone(), arrays: own.arrays.clone() };
+    let old = DetailedMesh { mesh, uvs: data.uvs.clone(), arrays: data.arrays.clone() };
     let spacing = tracker.params().spacing;
     let (positions, tree) = match source.rest.as_deref() {
         Some((rest, tree)) => (rest.of_change(ctx, particles, spacing, change)?, Some(tree)),
