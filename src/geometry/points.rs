@@ -323,9 +323,9 @@ impl Points {
             if self.attributes[..n].iter().any(|before| before.name == *name) {
                 return Err(Error::argument(format!("two attributes have the name \"{name}\"")));
             }
-            let there = each_type!(values, column => column.count()).unwrap_or(count);
-            fail_if(there != count, || {
-                Error::argument(format!("attribute \"{name}\" has {there} values for {count} points"))
+            let stored = each_type!(values, column => column.count()).unwrap_or(count);
+            fail_if(stored != count, || {
+                Error::argument(format!("attribute \"{name}\" has {stored} values for {count} points"))
             })?;
             if let Some(point) = values.first_not_finite() {
                 let what = format!("attribute \"{name}\" of point {} is not finite", point + 1);

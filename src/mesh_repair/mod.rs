@@ -302,9 +302,9 @@ fn finished(
     let positions = draft.positions.iter().enumerate().map(position).collect();
     let mesh = TriMesh { positions, triangles: draft.triangles };
     let used = crate::geometry::mesh::used(mesh.positions.len(), &mesh.triangles);
-    let names: Vec<u32> = used.unwrap_or_else(|| (0..mesh.positions.len() as u32).collect());
-    let original = |name: &u32| ((*name as usize) < own).then_some(*name);
-    let vertices = names.iter().map(original).collect();
+    let kept: Vec<u32> = used.unwrap_or_else(|| (0..mesh.positions.len() as u32).collect());
+    let original = |vertex: &u32| ((*vertex as usize) < own).then_some(*vertex);
+    let vertices = kept.iter().map(original).collect();
     report.kept_triangles = sources.iter().filter(|source| matches!(source, Source::Whole(_))).count();
     Repaired { mesh: mesh.without_unused(), vertices, sources, report }
 }

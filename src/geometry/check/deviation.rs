@@ -388,12 +388,13 @@ mod tests {
             for n in 0..300 {
                 let point: DVec3 = random.vector([1.2, 0.2, 20.0][n % 3]).cast();
                 let best = |found: f64, facet: &Facet| found.min(facet.nearest(point, 0).square);
-                let least = tree.facets.iter().fold(f64::INFINITY, best).sqrt();
+                let expected = tree.facets.iter().fold(f64::INFINITY, best).sqrt();
                 let nearest = tree.nearest(point).unwrap();
                 let hinted = tree.search(point, guess).unwrap();
                 let squares = [nearest.distance, (nearest.position - point).norm(), hinted.square.sqrt()];
-                let is_least = squares.iter().all(|squares| (squares - least).abs() <= 1e-12 * (1.0 + least));
-                assert!(is_least, "{squares:?}: {least}");
+                let is_expected =
+                    squares.iter().all(|squares| (squares - expected).abs() <= 1e-12 * (1.0 + expected));
+                assert!(is_expected, "{squares:?}: {expected}");
                 guess = Some(hinted.facet);
             }
         }

@@ -55,17 +55,17 @@ pub fn parts_of(count: usize, uses: &[Use]) -> Vec<u32> {
     (0..count as u32).map(|triangle| sets.root(triangle)).collect()
 }
 
-/// Marks the triangles of parts that are already closed: each edge has two triangles that agree.
-pub fn sound(triangles: &[[u32; 3]], uses: &[Use], parts: &[u32]) -> Vec<bool> {
-    let mut is_sound = vec![true; parts.len()];
+/// Marks the triangles of parts that are closed manifolds: each edge has two triangles that agree.
+pub fn mark_closed_manifolds(triangles: &[[u32; 3]], uses: &[Use], parts: &[u32]) -> Vec<bool> {
+    let mut is_closed = vec![true; parts.len()];
     for run in uses.chunk_by(is_same_edge) {
         if run.len() != 2 || imbalance(triangles, run) != 0 {
-            is_sound[parts[run[0].1 as usize] as usize] = false;
+            is_closed[parts[run[0].1 as usize] as usize] = false;
         }
     }
     let mut counts = vec![0u32; parts.len()];
     parts.iter().for_each(|&part| counts[part as usize] += 1);
-    parts.iter().map(|&part| is_sound[part as usize] && counts[part as usize] >= MIN_TRIANGLES).collect()
+    parts.iter().map(|&part| is_closed[part as usize] && counts[part as usize] >= MIN_TRIANGLES).collect()
 }
 
 /// Which triangles must be flipped so that neighbours agree.

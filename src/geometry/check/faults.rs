@@ -264,11 +264,11 @@ impl Pairs {
         let corners =
             |triangle: usize| mesh.triangles[triangle].map(|vertex| mesh.positions[vertex as usize]);
         let of_triangle = |first: usize| {
-            let (names, mine) = (mesh.triangles[first], corners(first));
+            let (vertices, own) = (mesh.triangles[first], corners(first));
             let mut pairs = Self::default();
             near.of_triangle(first, |second| {
-                let common = names.iter().filter(|name| mesh.triangles[second].contains(name)).count();
-                pairs.count(meeting(&mine, &corners(second)), common);
+                let common = vertices.iter().filter(|vertex| mesh.triangles[second].contains(vertex)).count();
+                pairs.count(meeting(&own, &corners(second)), common);
             });
             pairs
         };

@@ -240,7 +240,7 @@ pub fn coincident(positions: impl Iterator<Item = DVec3>) -> Vec<u32> {
                     slots[slot] = number;
                     return number;
                 }
-                there if keys[there as usize] == *key => return there,
+                other if keys[other as usize] == *key => return other,
                 _ => slot = (slot + 1) & ((1 << bits) - 1),
             }
         }

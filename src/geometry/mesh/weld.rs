@@ -109,8 +109,8 @@ pub struct Boundary {
 impl Boundary {
     /// `firsts` has the first vertex at the same position for each; triangles that use one of these twice do not count.
     pub fn of(triangles: &[[u32; 3]], firsts: &[u32]) -> Self {
-        let named = |corners: &[u32; 3]| corners.map(|vertex| firsts[vertex as usize]);
-        let whole = triangles.iter().map(named).filter(|[a, b, c]| a != b && b != c && c != a);
+        let joined = |corners: &[u32; 3]| corners.map(|vertex| firsts[vertex as usize]);
+        let whole = triangles.iter().map(joined).filter(|[a, b, c]| a != b && b != c && c != a);
         let sides = |[a, b, c]: [u32; 3]| [[a, b], [b, c], [c, a]].map(|[i, j]| (i.min(j), i.max(j)));
         // Short lists: few edges begin at one vertex.
         let mut ends = Lists::new(firsts.len(), whole.flat_map(sides));
@@ -344,13 +344,13 @@ impl<'a> Rounds<'a> {
         ambiguous.sort_unstable();
         ambiguous.dedup();
         // Boundary vertices are the first at their positions, and sets are named by their smallest vertex.
-        let mut named: Vec<u32> = (0..firsts.len() as u32).collect();
+        let mut joined_to: Vec<u32> = (0..firsts.len() as u32).collect();
         for (&vertex, &root) in vertices.iter().zip(&roots) {
-            named[vertex as usize] = vertices[root as usize];
+            joined_to[vertex as usize] = vertices[root as usize];
         }
-        let is_near = |vertex: &u32| named[firsts[*vertex as usize] as usize] != firsts[*vertex as usize];
+        let is_near = |vertex: &u32| joined_to[firsts[*vertex as usize] as usize] != firsts[*vertex as usize];
         let near = (0..firsts.len() as u32).filter(is_near).collect();
-        firsts.iter_mut().for_each(|first| *first = named[*first as usize]);
+        firsts.iter_mut().for_each(|first| *first = joined_to[*first as usize]);
         Weld { firsts, near, ambiguous }
     }
 }
@@ -380,7 +380,7 @@ fn near_pairs(steps: &[[i64; 3]], some: &[u32]) -> (Vec<NearPair>, Vec<u32>) {
         }
         slot
     };
-    let (mut pairs, mut crowded) = (Vec::new(), Vec::new());
+    let (mut pairs, mut with_too_many) = (Vec::new(), Vec::new());
     for &vertex in some {
         let at = steps[vertex as usize];
         let [low, high] = [-STEPS, STEPS].map(|by| cell(at.map(|step| step + by)));
@@ -402,11 +402,11 @@ fn near_pairs(steps: &[[i64; 3]], some: &[u32]) -> (Vec<NearPair>, Vec<u32>) {
             }
         }
         if count == MAX_NEAR {
-            crowded.push(vertex);
+            with_too_many.push(vertex);
         }
         let slot = find(&slots, cell(at));
         before[vertex as usize] = slots[slot];
         slots[slot] = vertex;
     }
-    (pairs, crowded)
+    (pairs, with_too_many)
 }

@@ -66,7 +66,7 @@ pub fn parse_polygons_from(path: &Path, bytes: &[u8], origin: DVec3) -> Result<P
 }
 
 /// As [`read_polygons`], for a file that may hold an empty mesh, such as a frame of a liquid before it appears or after it is gone. The
-/// file must declare this, as a .ply with 0 faces and an .obj of ours do, or be an .stl.
+/// file must declare this, as a .ply with 0 faces and an .obj by frazil do, or be an .stl.
 ///
 /// # Errors
 /// As [`read`], except for a mesh that has neither vertices nor faces.

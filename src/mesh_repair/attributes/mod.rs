@@ -213,37 +213,37 @@ impl<'a> Origins<'a> {
         for (number, _) in parts {
             let (chart, weights) = &self.triangles[number];
             let of_chart = self.old[*chart];
-            let names = triangles[number].map(|vertex| self.own(vertex));
-            for (corner, (name, weights)) in names.iter().zip(weights).enumerate() {
-                let Some(name) = name.filter(|name| !of_chart.contains(name)) else { continue };
-                let gone = (0..3usize).filter(|other| !names.contains(&Some(of_chart[*other])));
+            let vertices = triangles[number].map(|vertex| self.own(vertex));
+            for (corner, (vertex, weights)) in vertices.iter().zip(weights).enumerate() {
+                let Some(vertex) = vertex.filter(|vertex| !of_chart.contains(vertex)) else { continue };
+                let gone = (0..3usize).filter(|other| !vertices.contains(&Some(of_chart[*other])));
                 let nearest = gone.max_by(|a, b| weights[*a].total_cmp(&weights[*b]));
                 let index = |other: usize| uvs.indices(self.old, *chart)[other];
-                corners.extend(nearest.map(|at| (3 * number + corner, name, [of_chart[at], index(at)])));
+                corners.extend(nearest.map(|at| (3 * number + corner, vertex, [of_chart[at], index(at)])));
             }
         }
-        let count = corners.iter().map(|(_, name, _)| *name as usize + 1).max().unwrap_or(0);
+        let count = corners.iter().map(|(_, vertex, _)| *vertex as usize + 1).max().unwrap_or(0);
         if count == 0 {
             return Vec::new();
         }
         let mut is_wanted = vec![false; count];
-        corners.iter().for_each(|(_, name, _)| is_wanted[*name as usize] = true);
+        corners.iter().for_each(|(_, vertex, _)| is_wanted[*vertex as usize] = true);
         let mut around: Vec<(u32, usize)> = Vec::new();
-        for (triangle, names) in self.old.iter().enumerate() {
-            let wanted = names.iter().filter(|name| is_wanted.get(**name as usize) == Some(&true));
-            around.extend(wanted.map(|name| (*name, triangle)));
+        for (triangle, vertices) in self.old.iter().enumerate() {
+            let wanted = vertices.iter().filter(|vertex| is_wanted.get(**vertex as usize) == Some(&true));
+            around.extend(wanted.map(|vertex| (*vertex, triangle)));
         }
         around.sort_unstable();
-        let index_in = |triangle: usize, name: u32, [gone, index]: [u32; 2]| {
-            let (names, indices) = (self.old[triangle], uvs.indices(self.old, triangle));
-            let is_same_side = (0..3usize).any(|at| (names[at], indices[at]) == (gone, index));
-            let at = names.iter().position(|other| *other == name)?;
+        let index_in = |triangle: usize, vertex: u32, [gone, index]: [u32; 2]| {
+            let (vertices, indices) = (self.old[triangle], uvs.indices(self.old, triangle));
+            let is_same_side = (0..3usize).any(|at| (vertices[at], indices[at]) == (gone, index));
+            let at = vertices.iter().position(|other| *other == vertex)?;
             is_same_side.then_some(indices[at])
         };
-        let found = |(corner, name, gone): (usize, u32, [u32; 2])| {
-            let begin = around.partition_point(|(other, _)| *other < name);
-            let mut own = around[begin..].iter().take_while(|(other, _)| *other == name);
-            own.find_map(|(_, triangle)| index_in(*triangle, name, gone)).map(|index| (corner, index))
+        let found = |(corner, vertex, gone): (usize, u32, [u32; 2])| {
+            let begin = around.partition_point(|(other, _)| *other < vertex);
+            let mut own = around[begin..].iter().take_while(|(other, _)| *other == vertex);
+            own.find_map(|(_, triangle)| index_in(*triangle, vertex, gone)).map(|index| (corner, index))
         };
         corners.into_iter().filter_map(found).collect()
     }
@@ -258,8 +258,8 @@ impl<'a> Origins<'a> {
                 weights[nearest] == 1.0 && coordinate(self.old[chart][nearest]) != coordinate(own)
             })
         };
-        self.triangles.iter().zip(triangles).any(|((chart, weights), names)| {
-            weights.iter().zip(names).any(|(weights, vertex)| is_other(*chart, weights, *vertex))
+        self.triangles.iter().zip(triangles).any(|((chart, weights), vertices)| {
+            weights.iter().zip(vertices).any(|(weights, vertex)| is_other(*chart, weights, *vertex))
         })
     }
 }
@@ -450,16 +450,16 @@ mod tests {
         let lengths = [of_vertices, of_corners, of_faces].map(|array| array.values.len());
         assert_eq!(lengths, [vertices, 3 * triangles, triangles]);
         // Rebuilt geometry lies within a cell of the solid, but the nearest triangle of the old mesh may belong to another face of it.
-        let is_near = |value: f64, vertex: u32, most: f64| {
-            (value - f64::from(mesh.positions[vertex as usize].x)).abs() <= most
+        let is_near = |value: f64, vertex: u32, tolerance: f64| {
+            (value - f64::from(mesh.positions[vertex as usize].x)).abs() <= tolerance
         };
         for (vertex, own) in (0..).zip(&repaired.vertices) {
-            let most = if own.is_some() { 0.0 } else { 2.0 * cell };
-            assert!(is_near(of_vertices.values[vertex as usize], vertex, most), "{own:?}");
+            let tolerance = if own.is_some() { 0.0 } else { 2.0 * cell };
+            assert!(is_near(of_vertices.values[vertex as usize], vertex, tolerance), "{own:?}");
         }
         let mut whole = 0;
         for (triangle, source) in repaired.sources.iter().enumerate() {
-            let most = match source {
+            let tolerance = match source {
                 Source::Whole(from) => {
                     whole += 1;
                     assert_eq!(of_faces.values[triangle], f64::from(*from));
@@ -469,8 +469,10 @@ mod tests {
                 Source::New => 3.0 * cell,
             };
             let values = &of_corners.values[3 * triangle..];
-            let are_near =
-                mesh.triangles[triangle].iter().zip(values).all(|(vertex, x)| is_near(*x, *vertex, most));
+            let are_near = mesh.triangles[triangle]
+                .iter()
+                .zip(values)
+                .all(|(vertex, x)| is_near(*x, *vertex, tolerance));
             assert!(are_near, "{source:?} {:?}", &values[..3]);
         }
         assert!(whole > 4, "{whole}");

@@ -49,11 +49,11 @@ pub fn sewn(shape: &Shape, own: &[DVec3], cut: &Cut, fill: &Fill) -> Result<Draf
     let parts = cut.parts.iter().map(|(triangle, points)| (Source::Part(*triangle), points));
     let rebuilt = fill.triangles.iter().map(|points| (Source::New, points));
     for (source, points) in parts.chain(rebuilt) {
-        let mut names = [0; 3];
-        for (name, point) in names.iter_mut().zip(points) {
-            *name = number(&mut draft, *point)?;
+        let mut vertices = [0; 3];
+        for (vertex, point) in vertices.iter_mut().zip(points) {
+            *vertex = number(&mut draft, *point)?;
         }
-        draft.triangles.push(names);
+        draft.triangles.push(vertices);
         draft.sources.push(source);
     }
     Ok(draft)

@@ -86,10 +86,10 @@ fn is_beyond(p: Fixed, q: Fixed, (a, n): (usize, i32), (b, m): (usize, i32)) -> 
         _ => (2, true),
     };
     if a == first {
-        // Left of a line to the right is above it: the line is below the point.
+        // A point to the left of a line that runs right is above the line, so the line is below the point.
         is_left != (along_p > 0)
     } else {
-        // Left of a line upward is to the left of it: the line is right of the point.
+        // A point to the left of a line that runs up is left of the line, so the line is right of the point.
         (is_left == (along_q > 0)) != is_against
     }
 }
@@ -151,10 +151,10 @@ pub struct Trace {
 
 /// Traces triangle `number`, with these vertices and their positions, which passes through these edges of the grid, ascending. None if the
 /// data are inconsistent: the triangle has no area on the lattice in some view, or edges are missing.
-pub fn trace(number: u32, names: [u32; 3], v: [Fixed; 3], pierced: &[GridEdge]) -> Option<Trace> {
+pub fn trace(number: u32, vertices: [u32; 3], v: [Fixed; 3], pierced: &[GridEdge]) -> Option<Trace> {
     let mut traced = Trace { cells: v.map(cell_of), ..Trace::default() };
     for edge in 0..3 {
-        traced.edges[edge] = edge_passages(names, v, edge)?;
+        traced.edges[edge] = edge_passages(vertices, v, edge)?;
     }
     // Each plane that it passes through is entered and left once.
     let mut planes: Vec<(usize, i32)> = traced
@@ -172,7 +172,7 @@ pub fn trace(number: u32, names: [u32; 3], v: [Fixed; 3], pierced: &[GridEdge]) 
             let through =
                 passages.iter().find(|passage| passage.face.0 == axis && passage.face.1[axis] == plane);
             let Some(passage) = through else { continue };
-            let mut ends = [names[edge], names[(edge + 1) % 3]];
+            let mut ends = [vertices[edge], vertices[(edge + 1) % 3]];
             ends.sort_unstable();
             let point = (Point::OnEdge(ends, axis, plane), passage.face.1);
             if passage.is_onward {
@@ -205,9 +205,9 @@ pub fn trace(number: u32, names: [u32; 3], v: [Fixed; 3], pierced: &[GridEdge]) 
 
 /// The passages of an edge of a triangle, from its corner to the next; computed from the lower vertex, so that both its triangles find the
 /// same ones.
-fn edge_passages(names: [u32; 3], v: [Fixed; 3], edge: usize) -> Option<Vec<Passage>> {
+fn edge_passages(vertices: [u32; 3], v: [Fixed; 3], edge: usize) -> Option<Vec<Passage>> {
     let next = (edge + 1) % 3;
-    if names[edge] < names[next] {
+    if vertices[edge] < vertices[next] {
         return passages(v[edge], v[next]);
     }
     let mut back = passages(v[next], v[edge])?;

@@ -68,12 +68,12 @@ impl Shape {
     }
 
     fn corners(&self, triangle: u32) -> [Fixed; 3] {
-        self.triangles[triangle as usize].map(|name| self.fixed[name as usize])
+        self.triangles[triangle as usize].map(|vertex| self.fixed[vertex as usize])
     }
 
     fn traced(&self, triangle: u32) -> Option<Trace> {
-        let names = self.triangles[triangle as usize];
-        trace(triangle, names, self.corners(triangle), self.pierces.of_triangle(triangle))
+        let vertices = self.triangles[triangle as usize];
+        trace(triangle, vertices, self.corners(triangle), self.pierces.of_triangle(triangle))
     }
 
     /// The cells that a triangle passes through, ascending; those of its box if it cannot be traced.
@@ -161,17 +161,17 @@ impl Shape {
         set: &CellSet,
         rim: &mut Vec<(GridFace, [Point; 2])>,
     ) -> Vec<Half> {
-        let names = self.triangles[triangle as usize];
+        let vertices = self.triangles[triangle as usize];
         let mut halves = Vec::new();
         for (edge, passages) in traced.edges.iter().enumerate() {
-            let [name, next] = [names[edge], names[(edge + 1) % 3]];
+            let [vertex, next] = [vertices[edge], vertices[(edge + 1) % 3]];
             let mut cell = traced.cells[edge];
-            let mut from = (!set.holds(cell)).then_some(Point::Vertex(name));
+            let mut from = (!set.holds(cell)).then_some(Point::Vertex(vertex));
             for passage in passages {
                 let behind = cells_beside(passage.face)[usize::from(passage.is_onward)];
                 if set.holds(behind) != set.holds(cell) {
                     let (axis, at) = passage.face;
-                    let point = Point::OnEdge([name.min(next), name.max(next)], axis, at[axis]);
+                    let point = Point::OnEdge([vertex.min(next), vertex.max(next)], axis, at[axis]);
                     match from.take() {
                         Some(from) => halves.push(Half { ends: [from, point], cell }),
                         None => from = Some(point),

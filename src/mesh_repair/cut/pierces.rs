@@ -47,7 +47,7 @@ impl Pierces {
     pub fn of(fixed: &[Fixed], triangles: &[[u32; 3]]) -> Self {
         let faces: Vec<Face> = triangles
             .iter()
-            .map(|names| Face { v: names.map(|name| fixed[name as usize]), coef: 1 })
+            .map(|vertices| Face { v: vertices.map(|vertex| fixed[vertex as usize]), coef: 1 })
             .collect();
         let parts: Vec<Vec<(u32, GridEdge, Pierce)>> = faces
             .par_chunks(GRAIN)

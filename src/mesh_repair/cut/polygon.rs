@@ -12,7 +12,7 @@ type Corner = (Point, [f64; 2]);
 
 /// Triangulates the part of a triangle that lies to the left of these sides. None if the sides do not join.
 pub fn polygons(shape: &Shape, triangle: u32, halves: Vec<Half>) -> Option<Vec<[Point; 3]>> {
-    let [a, b, c] = shape.triangles[triangle as usize].map(|name| shape.position(Point::Vertex(name)));
+    let [a, b, c] = shape.triangles[triangle as usize].map(|vertex| shape.position(Point::Vertex(vertex)));
     let [a, b, c] = [a?, b?, c?];
     let normal = (b - a).cross(&(c - a));
     let along = normal.iamax();

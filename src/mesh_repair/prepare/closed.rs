@@ -19,26 +19,30 @@ pub(in crate::mesh_repair) struct Closed {
 }
 
 impl Closed {
-    /// Joins coinciding vertices among those of triangles that are not sound: each takes the index of the first.
-    pub fn join(&mut self, is_sound: &[bool]) {
+    /// Joins coinciding vertices of the triangles that are not part of a closed manifold: each takes the index of the first.
+    pub fn join(&mut self, is_closed_manifold: &[bool]) {
         let mut is_used = vec![false; self.mesh.positions.len()];
-        for (triangle, _) in self.mesh.triangles.iter().zip(is_sound).filter(|(_, sound)| !**sound) {
+        for (triangle, _) in
+            self.mesh.triangles.iter().zip(is_closed_manifold).filter(|(_, is_closed)| !**is_closed)
+        {
             triangle.iter().for_each(|&vertex| is_used[vertex as usize] = true);
         }
         let mut targets: Vec<u32> = (0..self.mesh.positions.len() as u32).collect();
         let used: Vec<u32> = targets.iter().copied().filter(|&vertex| is_used[vertex as usize]).collect();
         let positions: Vec<DVec3> =
             used.iter().map(|&vertex| self.mesh.positions[vertex as usize].cast()).collect();
-        let unsound = self.mesh.triangles.iter().zip(is_sound).filter(|(_, sound)| !**sound);
+        let others = self.mesh.triangles.iter().zip(is_closed_manifold).filter(|(_, is_closed)| !**is_closed);
         let number = |vertex: u32| used.partition_point(|other| *other < vertex) as u32;
-        let triangles: Vec<[u32; 3]> = unsound.map(|(triangle, _)| triangle.map(number)).collect();
+        let triangles: Vec<[u32; 3]> = others.map(|(triangle, _)| triangle.map(number)).collect();
         let weld = Weld::of(&positions, &triangles);
         self.prepared.ambiguous_vertices = weld.ambiguous.len();
         for (&vertex, first) in used.iter().zip(weld.firsts) {
             targets[vertex as usize] = used[first as usize];
             self.prepared.joined_vertices += usize::from(targets[vertex as usize] != vertex);
         }
-        for (triangle, _) in self.mesh.triangles.iter_mut().zip(is_sound).filter(|(_, sound)| !**sound) {
+        for (triangle, _) in
+            self.mesh.triangles.iter_mut().zip(is_closed_manifold).filter(|(_, is_closed)| !**is_closed)
+        {
             *triangle = triangle.map(|vertex| targets[vertex as usize]);
         }
     }

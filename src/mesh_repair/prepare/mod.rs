@@ -11,7 +11,7 @@ pub use closed::Prepared;
 use rayon::prelude::*;
 
 use super::fill::holes::close;
-use crate::geometry::check::edges::{Use, edge_uses, is_same_edge, parts_of, side, sound};
+use crate::geometry::check::edges::{Use, edge_uses, is_same_edge, mark_closed_manifolds, parts_of, side};
 use crate::geometry::check::predicates::is_flat;
 use crate::geometry::{TriMesh, Vec3};
 use copies::{copies, doubled, is_balanced};
@@ -34,9 +34,9 @@ pub(super) fn prepare(mesh: &TriMesh) -> Closed {
     };
     let uses = edge_uses(vertices, &mesh.triangles);
     let mut parts = parts_of(mesh.triangles.len(), &uses);
-    let is_sound = sound(&mesh.triangles, &uses, &parts);
-    if is_sound.contains(&false) {
-        closed.join(&is_sound);
+    let is_closed_manifold = mark_closed_manifolds(&mesh.triangles, &uses, &parts);
+    if is_closed_manifold.contains(&false) {
+        closed.join(&is_closed_manifold);
         closed.leave_out(&collapsed(&closed.mesh.triangles));
         let is_out = doubled(vertices, &closed.mesh.triangles);
         // Solids that nearly coincide share some triangles: if everything is closed as it is, it stays closed.

@@ -193,8 +193,8 @@ impl<'a> Tidy<'a> {
 
     /// Count of created triangles whose smallest altitude is below [`MIN_QUALITY`] of their longest edge.
     fn slivers(&self) -> usize {
-        let there = self.created.iter().filter(|&&triangle| self.rings.is_created(triangle));
-        there.filter(|&&triangle| altitude(&self.positions(triangle), 0.0) < MIN_QUALITY).count()
+        let remaining = self.created.iter().filter(|&&triangle| self.rings.is_created(triangle));
+        remaining.filter(|&&triangle| altitude(&self.positions(triangle), 0.0) < MIN_QUALITY).count()
     }
 
     /// Whether a triangle was created, still exists, and is below a quality.

@@ -160,14 +160,14 @@ impl Character {
                 let mut parts = document.meshes().flat_map(|mesh| mesh.primitives());
                 parts.any(|part| part.attributes().any(|(name, _)| wanted(&name)))
             };
-            let there = [
+            let contents = [
                 (has(|name| matches!(name, gltf::Semantic::TexCoords(0))), "UVs"),
                 (has(|name| matches!(name, gltf::Semantic::TexCoords(1..))), "further UVs"),
                 (has(|name| matches!(name, gltf::Semantic::Normals)), "normals"),
                 (has(|name| matches!(name, gltf::Semantic::Colors(_))), "colours"),
                 (has_materials, "materials"),
             ];
-            Ok(there.into_iter().filter(|(there, _)| *there).map(|(_, name)| name).collect())
+            Ok(contents.into_iter().filter(|(is_present, _)| *is_present).map(|(_, name)| name).collect())
         })
     }
 
@@ -305,12 +305,12 @@ fn chosen(file: &File, nodes: &[Node], pattern: Option<&str>) -> std::result::Re
     let roots = shown.clone();
     let mut picked: Vec<bool> =
         nodes.iter().map(|node| pattern.is_none_or(|p| matches(p, &node.name))).collect();
-    let named = picked.clone();
+    let is_match = picked.clone();
     for index in 0..nodes.len() {
         let mut at = Some(index);
         while let Some(node) = at {
             shown[index] |= roots[node];
-            picked[index] |= named[node];
+            picked[index] |= is_match[node];
             at = nodes[node].parent;
         }
     }
@@ -383,17 +383,17 @@ fn clip_names(file: &File) -> Vec<String> {
 
 fn clip(file: &File, name: Option<&str>) -> std::result::Result<Option<Clip>, String> {
     let names = clip_names(file);
-    let there = || listed(names.iter().map(String::as_str));
+    let all = || listed(names.iter().map(String::as_str));
     let number = match (name, names.len()) {
         (Some(""), _) | (None, 0) => return Ok(None),
         (None, 1) => 0,
-        (None, count) => return Err(format!("has {count} clips and none is chosen; they are {}", there())),
+        (None, count) => return Err(format!("has {count} clips and none is chosen; they are {}", all())),
         (Some(name), 0) => return Err(format!("has no clip \"{name}\", and no other")),
         (Some(name), _) => names.iter().position(|own| own == name).ok_or_else(|| {
             let same = file.document.animations().filter(|clip| clip.name() == Some(name)).count();
             match same {
-                0 => format!("has no clip \"{name}\"; its clips are {}", there()),
-                _ => format!("has {same} clips \"{name}\": choose one of {}", there()),
+                0 => format!("has no clip \"{name}\"; its clips are {}", all()),
+                _ => format!("has {same} clips \"{name}\": choose one of {}", all()),
             }
         })?,
     };

@@ -209,8 +209,8 @@ impl<'a> Space<'a> {
             }
         }
         let holds_all = |(holder, is_within): &(u32, bool)| {
-            let is_it = |other: &(u32, bool)| other.0 == *holder;
-            *is_within && held.iter().all(|held| held.iter().any(is_it))
+            let is_holder = |other: &(u32, bool)| other.0 == *holder;
+            *is_within && held.iter().all(|held| held.iter().any(is_holder))
         };
         let size = |part: u32| self.shapes[part as usize].size();
         let all = held.iter().flatten().filter(|holder| holds_all(holder) && size(holder.0) > shape.size());

@@ -4,7 +4,7 @@ use super::nesting::{ASLANT, Shape, Turns, turns};
 use super::outcome::{Closing, Fate, Orientation};
 use crate::geometry::check::duplicates::{Doubles, copies};
 use crate::geometry::check::edges::{
-    Agreement, Use, agree, edge_uses, imbalance, is_same_edge, parts_of, sound,
+    Agreement, Use, agree, edge_uses, imbalance, is_same_edge, mark_closed_manifolds, parts_of,
 };
 use crate::geometry::check::topology::Sets;
 use crate::geometry::shape::{bounds, normal, six_volumes};
@@ -79,16 +79,16 @@ impl<'a> Pieces<'a> {
         let raw: Vec<[u32; 3]> = self.numbers.iter().map(|at| triangles[*at as usize]).collect();
         let uses = edge_uses(vertices, &raw);
         let parts = parts_of(raw.len(), &uses);
-        let is_sound = sound(&raw, &uses, &parts);
+        let is_closed_manifold = mark_closed_manifolds(&raw, &uses, &parts);
         let sorted = |at: usize| {
             let mut corners = self.named[at];
             corners.sort_unstable();
             corners
         };
-        let is_copy = copies(&parts, |at| is_sound[at], sorted);
+        let is_copy = copies(&parts, |at| is_closed_manifold[at], sorted);
         for (at, corners) in raw.iter().enumerate() {
             let joined = self.named[at].map(|vertex| vertex + vertices as u32);
-            self.named[at] = if is_sound[at] { *corners } else { joined };
+            self.named[at] = if is_closed_manifold[at] { *corners } else { joined };
         }
         if is_copy.contains(&true) {
             self.leave_out(&is_copy, out);
