@@ -146,7 +146,7 @@ impl Axis {
     }
 
     /// The offset to a line whose coordinates differ by this amount.
-    pub fn beside(self, [p, q]: [f64; 2]) -> [f64; 3] {
+    pub fn offset(self, [p, q]: [f64; 2]) -> [f64; 3] {
         match self {
             Self::X => [0.0, q, p],
             Self::Y => [q, 0.0, p],

@@ -11,11 +11,11 @@ pub struct StepReport {
     pub jumped: usize,
     /// Vertices whose projection did not find the surface.
     pub lost: usize,
-    /// Vertices beside surface that the mesh does not cover: a merge or split has begun there.
+    /// Vertices beside uncovered surface: a merge or split has begun there.
     pub uncovered: usize,
     /// Count of parts into which the frame was divided.
     pub parts: usize,
-    /// Count of particles that are new, and of those that are gone.
+    /// Count of particles that appeared, and of those that disappeared.
     pub born: usize,
     /// See `born`.
     pub died: usize,

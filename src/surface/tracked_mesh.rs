@@ -133,8 +133,7 @@ impl Tracker {
         &self.delta
     }
 
-    /// Vertices at which the last step found a change: those that it could not project, and those beside surface that the mesh does not
-    /// cover.
+    /// Vertices at which the last step found a change: those that it could not project, and those beside uncovered surface.
     pub fn flags(&self) -> &[bool] {
         &self.flags
     }

@@ -16,7 +16,7 @@ use super::remesh::drift::Drift;
 use super::remesh::sizes;
 use super::report::StepReport;
 use super::topology::coverage::Cover;
-use super::topology::lost_vertices::gather;
+use super::topology::lost_vertices::move_lost_vertices;
 use super::topology::particle_count::ParticleCountTest;
 use super::topology::uncovered_parts::{MissingParts, Parts, UncoveredPart, Wanted};
 use super::track::advect::{advect, validate_step};
@@ -88,7 +88,7 @@ impl Tracker {
             let (delta, feet) = ctx.phase("measure", || Ok(tracker.measure(&distances)))?;
             tracker.delta = delta;
             let known = feet.iter().flatten().count();
-            let wanted = tracker.wanted_reach();
+            let wanted = tracker.required_reach();
             let farther = if known < tracker.delta.len() { tries.next() } else { None };
             let wider = tracker.deep(&tracker.vertices, farther.unwrap_or_default());
             if wanted <= tracker.reach && covers(&deep, &wider) {
@@ -97,7 +97,7 @@ impl Tracker {
                     tracker.coverage(ctx, &surface, &feet, (&particles.positions, true))
                 })?;
                 tracker.never_covered = uncovered;
-                let (lost, triangles) = (tracker.vertices.len() - known, surface.1.count());
+                let (lost, triangles) = (tracker.vertices.len() - known, surface.1.triangle_count());
                 return Ok((
                     tracker,
                     StepReport { lost, triangles, uncovered_parts, ..StepReport::default() },
@@ -156,7 +156,7 @@ impl Tracker {
             };
             next.flags = projections.iter().zip(&coverage.uncovered).map(is_flagged).collect();
             let counts = self.counts(&projections, &coverage.uncovered, &paths);
-            next.report = StepReport { parts, triangles: surface.1.count(), ..counts };
+            next.report = StepReport { parts, triangles: surface.1.triangle_count(), ..counts };
             let mut prefetch = Prefetch::default();
             if self.params.rebuild {
                 let change = || {
@@ -201,7 +201,7 @@ impl Tracker {
                 .zip(&delta)
                 .map(|(projection, delta)| projection.has_lost_surface(*delta))
                 .collect();
-            gather(&self.vertices, &self.triangles, &is_lost, &mut vertices);
+            move_lost_vertices(&self.vertices, &self.triangles, &is_lost, &mut vertices);
         }
         Ok((Next { vertices, delta, drifts, ..Next::default() }, projections))
     }
@@ -317,7 +317,7 @@ impl Tracker {
     }
 
     /// Required reach of the band everywhere (r): see [`REACHED`] and [`WIDE`].
-    fn wanted_reach(&self) -> f64 {
+    fn required_reach(&self) -> f64 {
         let mut far: Vec<f32> =
             self.delta.iter().filter(|delta| !delta.is_nan()).map(|delta| delta.abs()).collect();
         if far.is_empty() {

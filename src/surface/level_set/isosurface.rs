@@ -65,12 +65,12 @@ impl Isosurface {
     }
 
     /// Count of triangles.
-    pub fn count(&self) -> usize {
+    pub fn triangle_count(&self) -> usize {
         self.triangles.len()
     }
 
     /// Count of vertices.
-    pub fn vertices(&self) -> usize {
+    pub fn vertex_count(&self) -> usize {
         self.positions.len()
     }
 

@@ -52,7 +52,7 @@ pub fn disagreement(from: &Particles, to: &Particles, dt: f64, spacing: f64) -> 
 }
 
 /// Adds a warning to a step's report if over half of the mesh was lost or rebuilt, with a possible reason in the particles: `lost` of its
-/// `all` vertices did not find the particles' surface. There is no warning where much of the liquid itself is gone or new.
+/// `all` vertices did not find the particles' surface. There is no warning if much of the liquid itself has disappeared or is new.
 ///
 /// # Errors
 /// As [`disagreement`].
@@ -116,7 +116,7 @@ fn velocities_miss(from: &Particles, to: &Particles, dt: f64, spacing: f64) -> O
     let bin = |position: &DVec3| cell_of(&(position / spacing));
     let filled = |frame: &Particles| -> HashSet<Coord> { frame.positions.iter().map(bin).collect() };
     let (old, new) = (filled(from), filled(to));
-    // There must be liquid where velocities take it, and liquid where it must have come from.
+    // Tested forward from the first frame, and backward from the second.
     let missed = |frame: &Particles, other: &HashSet<Coord>, time: f64| {
         let goes = |at: usize| frame.positions[at] + DVec3::from(frame.velocities[at].map(f64::from)) * time;
         let is_missed = |at: &usize| !around(bin(&goes(*at))).iter().any(|cell| other.contains(cell));

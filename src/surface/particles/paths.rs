@@ -131,8 +131,8 @@ impl Paths {
         self.ranks[path as usize]
     }
 
-    /// Maximum displacement (m) of a particle.
-    pub fn farthest(&self) -> f64 {
+    /// Maximum displacement of a particle, or length of a tangent (m).
+    pub fn max_displacement(&self) -> f64 {
         let each = (0..self.count()).into_par_iter().with_min_len(4096);
         each.map(|n| {
             let displacement = (self.to[n] - self.from[n]).norm();
@@ -261,7 +261,7 @@ mod tests {
         let mut positions = Vec::new();
         paths.at(0.5, &mut positions);
         assert!((positions[0].x - 0.5).abs() < 1e-12 && (positions[1].x - 2.5).abs() < 1e-12);
-        assert_eq!(paths.farthest(), 1.0);
+        assert_eq!(paths.max_displacement(), 1.0);
     }
 
     #[test]
@@ -270,7 +270,7 @@ mod tests {
         let none = Particles::default();
         let away = Paths::between(&some, &none, 0.1).unwrap();
         assert_eq!((away.count(), away.died, away.born), (2, 2, 0));
-        assert_eq!(away.farthest(), 1.0, "they go on");
+        assert_eq!(away.max_displacement(), 1.0, "they go on");
         let back = Paths::between(&none, &some, 0.1).unwrap();
         assert_eq!((back.count(), back.died, back.born), (0, 0, 2));
         let still = Particles { velocities: Vec::new(), ..some.clone() };

@@ -34,7 +34,7 @@ impl Improvable<'_> {
         let [shortest, longest] = self.target(ends);
         let target = if now > longest { longest } else { shortest };
         let change = (now - before).abs();
-        // Particles that have not moved cause no strain, even if a fit through few of them says so.
+        // Ends that have hardly moved mean no strain: the difference comes from a fit to few particles.
         let is_still = |at: usize| drift(at).norm() <= STILL * self.jitter;
         let is_still = is_still(a) && is_still(b);
         let rests = is_still || change <= (STRAIN * target).max(self.jitter);

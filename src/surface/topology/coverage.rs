@@ -127,7 +127,7 @@ fn candidates(phi: &Implicit, surface: &Isosurface, parts: &Parts, with_feet: &M
         let position = surface.in_cells(phi, vertex);
         (parts.is_covered(vertex) && !with_feet.has(cell_of(&position))).then_some(position)
     };
-    (0..surface.vertices() as u32).into_par_iter().with_min_len(4096).filter_map(position).collect()
+    (0..surface.vertex_count() as u32).into_par_iter().with_min_len(4096).filter_map(position).collect()
 }
 
 /// Items in cubes of an edge (cells).

@@ -7,7 +7,12 @@ use crate::geometry::DVec3;
 const RINGS: usize = 16;
 
 /// Moves lost vertices (m) by the displacement since `before` of those around them, ring by ring; those with none around stay.
-pub fn gather(before: &[DVec3], triangles: &[[u32; 3]], is_lost: &[bool], vertices: &mut [DVec3]) {
+pub fn move_lost_vertices(
+    before: &[DVec3],
+    triangles: &[[u32; 3]],
+    is_lost: &[bool],
+    vertices: &mut [DVec3],
+) {
     let near: Vec<&[u32; 3]> =
         triangles.iter().filter(|corners| corners.iter().any(|corner| is_lost[*corner as usize])).collect();
     let mut due: Vec<u32> = near.iter().flat_map(|corners| **corners).collect();
@@ -55,13 +60,13 @@ mod tests {
         vertices[1] += DVec3::y();
         vertices[3] = DVec3::repeat(1e6);
         let is_lost = [false, false, true, true, true, true];
-        gather(&before, &triangles, &is_lost, &mut vertices);
+        move_lost_vertices(&before, &triangles, &is_lost, &mut vertices);
         for (position, first) in vertices.iter().zip(&before) {
             assert!((position - first - DVec3::y()).norm() < 1e-12, "{position:?}");
         }
         // If no vertex is known, none moves.
         let mut alone = vertices.clone();
-        gather(&before, &triangles, &[true; 6], &mut alone);
+        move_lost_vertices(&before, &triangles, &[true; 6], &mut alone);
         assert!(alone == vertices);
     }
 }

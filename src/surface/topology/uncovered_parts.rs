@@ -61,7 +61,7 @@ impl Parts {
     pub fn new(phi: &Implicit, surface: &Isosurface, mut feet: Vec<Coord>) -> Self {
         feet.par_sort_unstable();
         feet.dedup();
-        let mut sets = Sets::new(surface.vertices());
+        let mut sets = Sets::new(surface.vertex_count());
         for &[a, b, c] in surface.runs().flat_map(|(_, triangles)| triangles) {
             sets.join(a, b);
             sets.join(a, c);

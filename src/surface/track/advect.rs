@@ -76,7 +76,7 @@ pub fn advect(
     spacing: f64,
     weighting: Weighting,
 ) -> Result<usize> {
-    let parts = (paths.farthest() / (STEP * spacing)).ceil().clamp(1.0, MAX_PARTS as f64) as usize;
+    let parts = (paths.max_displacement() / (STEP * spacing)).ceil().clamp(1.0, MAX_PARTS as f64) as usize;
     if paths.count() == 0 {
         return Ok(parts);
     }

@@ -1,4 +1,4 @@
-//! Where the band of distances must reach farther than elsewhere: around the few vertices whose detail is deeper than that of nearly all
+//! Blocks in which the band of distances must reach farther than elsewhere: around the few vertices with much deeper detail than nearly all
 //! others. A band that wide over the whole surface would take many times as long.
 
 use std::collections::BTreeMap;

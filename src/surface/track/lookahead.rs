@@ -1,5 +1,5 @@
-//! Steps of a tracker that are computed in advance: their changes are known before they happen (`track/easing.rs`), and the results are
-//! reused when their turn comes.
+//! Steps of a tracker that are computed in advance, so that easing (`track/easing.rs`) knows their changes; the results are reused when the
+//! steps are made.
 
 use std::collections::VecDeque;
 

@@ -70,7 +70,7 @@ struct Clipper<'a> {
 /// Cancel.
 pub fn facets(ctx: &Context, bins: &Bins, exposure: &Exposure) -> Result<Vec<Facet>> {
     let clipper = || Clipper { bins, exposure, prisms: Prisms::default() };
-    let order = order(bins);
+    let order = faces_by_bin(bins);
     let verdict = |clipper: &mut Clipper<'_>, &id: &u32| {
         if ctx.check().is_err() { BURIED } else { clipper.verdict(id as usize) }
     };
@@ -96,7 +96,7 @@ pub fn facets(ctx: &Context, bins: &Bins, exposure: &Exposure) -> Result<Vec<Fac
 }
 
 /// The faces sorted by bin, so that a bin's prisms stay in the cache.
-fn order(bins: &Bins) -> Vec<u32> {
+fn faces_by_bin(bins: &Bins) -> Vec<u32> {
     let position = |id: usize| (bins.of_voxel(voxel_of(middle(&bins.faces[id].v))), id as u32);
     let mut positions: Vec<(Option<usize>, u32)> =
         (0..bins.faces.len()).into_par_iter().map(position).collect();
@@ -237,7 +237,7 @@ impl Clipper<'_> {
             }
             nearby if nearby & LOOSE == 0 || nearby & !(STACK | LOOSE) == BURIED => false,
             _ => {
-                let exposed = self.exposure.within(id as u32, extent(&v));
+                let exposed = self.exposure.is_exposed_within(id as u32, extent(&v));
                 let own = self.sampled(&v, hair) | if exposed { OPEN } else { 0 };
                 self.split(id, v, own, hair, bin_flags, out)
             }
@@ -271,7 +271,7 @@ impl Clipper<'_> {
             return false;
         }
         self.clip(v, hair, out);
-        if out.len() == begin && self.exposure.within(id as u32, extent(&v)) {
+        if out.len() == begin && self.exposure.is_exposed_within(id as u32, extent(&v)) {
             out.push((v, false));
         }
         out[begin..] == [(v, true)]

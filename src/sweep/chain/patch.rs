@@ -92,7 +92,12 @@ impl Patches<'_> {
         let beside = (-1..=1).flat_map(|p| (-1..=1).map(move |q| [p, q])).filter(|beside| *beside != [0, 0]);
         beside.into_iter().all(|[p, q]| {
             let position = on_plane(spot, normal, [p, q].map(f64::from))[spot.axis.index()];
-            self.exposure.agrees(spot, [spot.line[0] + p, spot.line[1] + q], position, OFF_BESIDE / slope)
+            self.exposure.has_meeting_near(
+                spot,
+                [spot.line[0] + p, spot.line[1] + q],
+                position,
+                OFF_BESIDE / slope,
+            )
         })
     }
 
@@ -125,7 +130,7 @@ impl Patches<'_> {
 
 /// The point of a spot's plane on the line at this offset (cells) from the spot's own line.
 fn on_plane(spot: &Spot, normal: &Point, [p, q]: [f64; 2]) -> Point {
-    let offset = spot.axis.beside([p, q]);
+    let offset = spot.axis.offset([p, q]);
     let mut at = spot.at();
     let rise = -dot(*normal, offset) / normal[spot.axis.index()];
     (0..3).for_each(|axis| at[axis] += offset[axis]);

@@ -271,7 +271,7 @@ impl Body {
         if to <= from {
             return Ok(poses);
         }
-        let ends = self.ends(from, to)?;
+        let ends = self.interval_ends(from, to)?;
         let mut begin = from;
         for end in ends {
             let first = poses.last().expect("the first pose is there").clone();
@@ -280,7 +280,7 @@ impl Body {
             let quarters: Vec<Vec<DVec3>> =
                 [0.25, 0.5, 0.75].par_iter().map(quarter).collect::<Result<_>>()?;
             let steps =
-                self.steps(&[&first, &quarters[0], &quarters[1], &quarters[2], &last], tolerance, near);
+                self.step_count(&[&first, &quarters[0], &quarters[1], &quarters[2], &last], tolerance, near);
             let count = poses.len() + steps;
             let bytes = (count * self.shape.topology.vertex_count() * BYTES_PER_POSITION) as u64;
             ctx.allow("the poses of a body (a shorter motion or larger cells need fewer)", bytes)?;
@@ -311,7 +311,7 @@ impl Body {
 
     /// Ends of the sub-intervals in which steps are chosen: the motion's breaks, and times between which it rotates so little that five
     /// poses show how far its paths deviate from straight lines.
-    fn ends(&self, from: f64, to: f64) -> Result<Vec<f64>> {
+    fn interval_ends(&self, from: f64, to: f64) -> Result<Vec<f64>> {
         self.turning(from, to)?;
         let mut ends = Vec::new();
         let mut begin = from;
@@ -325,7 +325,7 @@ impl Body {
     }
 
     /// Number of equal steps an interval needs, from five poses at its quarters.
-    fn steps(&self, probes: &[&Vec<DVec3>; 5], tolerance: f64, near: &WindowTest) -> usize {
+    fn step_count(&self, probes: &[&Vec<DVec3>; 5], tolerance: f64, near: &WindowTest) -> usize {
         let bend = |vertex: usize| -> f64 {
             let path = probes.map(|probe| probe[vertex]);
             if !near.reaches(&path) {

@@ -137,7 +137,7 @@ impl Exposure {
     }
 
     /// Whether a face is exposed on a line through a box (cells).
-    pub fn within(&self, face: u32, (low, high): ([f32; 3], [f32; 3])) -> bool {
+    pub fn is_exposed_within(&self, face: u32, (low, high): ([f32; 3], [f32; 3])) -> bool {
         let (low, high) = (low.map(|value| value - 0.01), high.map(|value| value + 0.01));
         self.along.iter().any(|along| along.exposes(face, low, high))
     }
@@ -161,7 +161,7 @@ impl Exposure {
     }
 
     /// Whether the line at `line`, parallel to that of `spot`, has a meeting of the same direction within `off` cells of `position`.
-    pub fn agrees(&self, spot: &Spot, line: [i32; 2], position: f64, off: f64) -> bool {
+    pub fn has_meeting_near(&self, spot: &Spot, line: [i32; 2], position: f64, off: f64) -> bool {
         let mut meetings = self.along[spot.axis.index()].line(line).iter();
         meetings.any(|other| (other.position - position).abs() <= off && other.enters == spot.enters)
     }
