@@ -108,7 +108,7 @@ pub fn name_velocities(arrays: &mut [MeshArray]) {
     }
 }
 
-/// The vertex vectors whose components are the arrays of these names.
+/// Vectors of the vertices, from the arrays of their x, y and z.
 pub fn vectors(arrays: &[MeshArray], names: [&str; 3]) -> Option<Vec<Vec3>> {
     let part = |name: &str| arrays.iter().find(|array| array.on == On::Vertices && array.name == name);
     let [x, y, z] = names.map(part);

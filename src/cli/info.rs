@@ -92,7 +92,7 @@ fn character(path: &Path, origin: &Origin) -> frazil::Result<Vec<Value>> {
     if !gaits.is_empty() {
         entry["gaits"] = Value::Object(gaits);
     }
-    if contents.mesh_nodes.len() > FEW_NODES {
+    if contents.mesh_nodes.len() > MAX_NODES_IN_LINE {
         let line = |(name, depth, has_mesh): &(String, usize, bool)| {
             format!("{}{name}{}", "  ".repeat(*depth), if *has_mesh { " (mesh)" } else { "" })
         };
@@ -102,7 +102,7 @@ fn character(path: &Path, origin: &Origin) -> frazil::Result<Vec<Value>> {
 }
 
 /// Maximum number of nodes listed in one line.
-const FEW_NODES: usize = 6;
+const MAX_NODES_IN_LINE: usize = 6;
 
 /// How the lowest parts of a clip move while they stand (in the file's unit, Y up).
 fn clip_gait(path: &Path, clip: &str, seconds: f64) -> frazil::Result<Value> {

@@ -63,7 +63,7 @@ pub fn check_report(path: &Path) -> Result<()> {
     Err(Error::file(path, "exists and is not the report of a run: choose another name for --report"))
 }
 
-/// Whether new files can be created in a folder.
+/// Checks that new files can be created in a folder.
 pub fn check_folder(folder: &Path) -> Result<()> {
     let probe = folder.join(format!(".frazil-probe-{}", std::process::id()));
     let made = std::fs::File::create_new(&probe);

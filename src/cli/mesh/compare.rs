@@ -11,7 +11,7 @@ use frazil::scene::FrameChoice;
 use frazil::{Context, Error, io};
 use serde_json::{Map, Value, json};
 
-use super::compared::Model;
+use super::compared_mesh::ComparedMesh;
 use crate::cli::options::{Origin, frame_path};
 use crate::cli::output;
 use crate::cli::session::{Failure, OrFailure, Session};
@@ -99,12 +99,12 @@ impl Args {
 
     /// Compares two files.
     fn files(&self, session: &Session) -> Result<(), Failure> {
-        let models = self
+        let meshes = self
             .paths()
-            .map(|path| Model::read(path, &self.origin))
+            .map(|path| ComparedMesh::read(path, &self.origin))
             .collect::<frazil::Result<Vec<_>>>()
             .or_refuse()?;
-        let [a, b] = &models[..] else { return Err(Failure::refused("a second mesh is missing")) };
+        let [a, b] = &meshes[..] else { return Err(Failure::refused("a second mesh is missing")) };
         let found = Comparison::of(&session.ctx, a, b).or_fail()?;
         if self.json {
             let mut object = self.names();
@@ -127,15 +127,15 @@ impl Args {
         let flicker_of = |path: &PathBuf| has_flicker(path).then(|| Flicker::of(path));
         let mut flickers: Vec<Option<Flicker>> = self.paths().map(flicker_of).collect();
         let mut found: Vec<(i32, Comparison)> = Vec::new();
-        let models = |frame: i32| {
+        let meshes = |frame: i32| {
             self.paths()
-                .map(|path| Model::read(&frame_path(path, frame), &self.origin))
+                .map(|path| ComparedMesh::read(&frame_path(path, frame), &self.origin))
                 .collect::<frazil::Result<Vec<_>>>()
         };
         // Fail early if the first frame cannot be compared.
-        self.compare_frame(session, models(frames[0]).or_refuse()?, frames[0], &mut found, &mut flickers)?;
+        self.compare_frame(session, meshes(frames[0]).or_refuse()?, frames[0], &mut found, &mut flickers)?;
         let result = frames[1..].iter().try_for_each(|&frame| {
-            self.compare_frame(session, models(frame).or_fail()?, frame, &mut found, &mut flickers)
+            self.compare_frame(session, meshes(frame).or_fail()?, frame, &mut found, &mut flickers)
         });
         let flickers = || flickers.iter().flatten();
         if !self.json {
@@ -156,20 +156,20 @@ impl Args {
     fn compare_frame(
         &self,
         session: &Session,
-        models: Vec<Model>,
+        meshes: Vec<ComparedMesh>,
         frame: i32,
         found: &mut Vec<(i32, Comparison)>,
         flickers: &mut [Option<Flicker>],
     ) -> Result<(), Failure> {
         session.ctx.check().or_fail()?;
-        if let [a, b] = &models[..] {
+        if let [a, b] = &meshes[..] {
             let comparison = Comparison::of(&session.ctx, a, b).or_fail()?;
             self.print_now(&format!("frame {frame}: {}\n", comparison.in_a_line()))?;
             found.push((frame, comparison));
         }
-        for (flicker, model) in flickers.iter_mut().zip(models) {
+        for (flicker, mesh) in flickers.iter_mut().zip(meshes) {
             let Some(flicker) = flicker else { continue };
-            if let Some(text) = flicker.add(&session.ctx, frame, model).or_fail()? {
+            if let Some(text) = flicker.add(&session.ctx, frame, mesh).or_fail()? {
                 self.print_now(&text)?;
             }
         }
@@ -217,7 +217,7 @@ struct Comparison {
 }
 
 impl Comparison {
-    fn of(ctx: &Context, a: &Model, b: &Model) -> frazil::Result<Self> {
+    fn of(ctx: &Context, a: &ComparedMesh, b: &ComparedMesh) -> frazil::Result<Self> {
         let both = [&a.mesh, &b.mesh];
         Ok(Self {
             distances: SurfaceDistances::of(ctx, &a.mesh, &b.mesh)?,
@@ -360,7 +360,7 @@ fn hausdorff(found: &[(i32, Comparison)]) -> f64 {
 struct Flicker {
     name: String,
     /// The previous frames, at most two.
-    last: Vec<(i32, Model)>,
+    last: Vec<(i32, ComparedMesh)>,
     steps: Vec<Step>,
 }
 
@@ -378,13 +378,13 @@ impl Flicker {
     }
 
     /// Adds the next frame; returns its contribution as text.
-    fn add(&mut self, ctx: &Context, frame: i32, model: Model) -> frazil::Result<Option<String>> {
+    fn add(&mut self, ctx: &Context, frame: i32, mesh: ComparedMesh) -> frazil::Result<Option<String>> {
         let step = match &self.last[..] {
-            [.., (before, last)] if !model.has_faces_of(last) => {
-                Some(Step::Surfaces([*before, frame], SurfaceDistances::of(ctx, &last.mesh, &model.mesh)?))
+            [.., (before, last)] if !mesh.has_faces_of(last) => {
+                Some(Step::Surfaces([*before, frame], SurfaceDistances::of(ctx, &last.mesh, &mesh.mesh)?))
             }
             [(_, first), (middle, last)] if last.has_faces_of(first) => {
-                let found = second_differences([&first.mesh, &last.mesh, &model.mesh]);
+                let found = second_differences([&first.mesh, &last.mesh, &mesh.mesh]);
                 found.map(|found| Step::Vertices(*middle, found))
             }
             _ => None,
@@ -392,13 +392,13 @@ impl Flicker {
         if self.last.len() == 2 {
             self.last.remove(0);
         }
-        self.last.push((frame, model));
+        self.last.push((frame, mesh));
         let text = step.as_ref().map(|step| format!("{}, {}\n", self.name, step.in_words()));
         self.steps.extend(step);
         Ok(text)
     }
 
-    /// The middle frames of the second differences.
+    /// The second differences with their middle frames.
     fn vertices(&self) -> impl Iterator<Item = (i32, &Deviation)> {
         self.steps.iter().filter_map(|step| match step {
             Step::Vertices(frame, found) => Some((*frame, found)),

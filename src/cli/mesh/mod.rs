@@ -1,7 +1,7 @@
 //! `frazil mesh`: checks meshes and changes them; one file for each command.
 
 mod compare;
-mod compared;
+mod compared_mesh;
 mod repair;
 
 use std::path::{Path, PathBuf};

@@ -79,32 +79,7 @@ impl Inputs {
         if surface.every && !surface.rebuild {
             warnings.push(r#"surface.match = "every" does nothing where surface.rebuild is false"#.into());
         }
-        let estimate = match surface.spacing {
-            Some(_) => rough_spacing(&particles.positions),
-            None => estimate_spacing(&particles.positions),
-        };
-        let spacing = match (surface.spacing, estimate) {
-            (Some(spacing), _) => spacing,
-            (None, Some(estimate)) => {
-                warnings.push(format!(
-                    "{}: the spacing of the particles is estimated as {estimate:.6} m; surface.spacing sets it",
-                    first.display()
-                ));
-                estimate
-            }
-            (None, None) => {
-                let what = "has too few particles, or too many at one position, to tell their spacing: give surface.spacing";
-                return Err(Error::file(first, what));
-            }
-        };
-        if let Some(estimate) =
-            estimate.filter(|estimate| !(1.0 / MAX_RATIO..=MAX_RATIO).contains(&(spacing / estimate)))
-        {
-            warnings.push(format!(
-                "{}: surface.spacing is {spacing} m, but particles lie {estimate:.6} m apart",
-                first.display()
-            ));
-        }
+        let spacing = spacing_of(surface, &particles, &first, &mut warnings)?;
         // The mesh lies near the particles, and has 32-bit positions.
         let far = base_mesh::farthest(particles.positions.iter());
         let name = first.display().to_string();
@@ -146,6 +121,37 @@ impl Inputs {
         inputs.warnings.iter().for_each(|warning| log::warn!("{warning}"));
         Ok(inputs)
     }
+}
+
+/// The spacing (m) of the particles in the file `first`: that of the scene, or else an estimate. Adds a warning if it is estimated, or if it
+/// differs much from the estimate.
+///
+/// # Errors
+/// Particles that allow no estimate, and no spacing in the scene.
+fn spacing_of(
+    surface: &Surface,
+    particles: &Particles,
+    first: &Path,
+    warnings: &mut Vec<String>,
+) -> Result<f64> {
+    let Some(spacing) = surface.spacing else {
+        let what =
+            "has too few particles, or too many at one position, to tell their spacing: give surface.spacing";
+        let estimate = estimate_spacing(&particles.positions).ok_or_else(|| Error::file(first, what))?;
+        warnings.push(format!(
+            "{}: the spacing of the particles is estimated as {estimate:.6} m; surface.spacing sets it",
+            first.display()
+        ));
+        return Ok(estimate);
+    };
+    let differs = |estimate: &f64| !(1.0 / MAX_RATIO..=MAX_RATIO).contains(&(spacing / estimate));
+    if let Some(estimate) = rough_spacing(&particles.positions).filter(differs) {
+        warnings.push(format!(
+            "{}: surface.spacing is {spacing} m, but particles lie {estimate:.6} m apart",
+            first.display()
+        ));
+    }
+    Ok(spacing)
 }
 
 /// A mesh from a file, in metres, and closed if it is to be rebuilt; with a warning in a sentence.

@@ -1,4 +1,4 @@
-//! The meshes compared by `frazil mesh compare`.
+//! A mesh as `frazil mesh compare` compares it.
 
 use std::path::Path;
 
@@ -8,14 +8,14 @@ use frazil::motion::{Character, is_gltf};
 use crate::cli::options::{Origin, warn_if_far};
 
 /// A mesh in triangles, and its faces as the file has them: non-planar polygons may be triangulated differently in another frame.
-pub struct Model {
+pub struct ComparedMesh {
     /// In triangles.
     pub mesh: TriMesh,
     /// As the file has them, without their arrays.
     pub faces: PolygonMesh,
 }
 
-impl Model {
+impl ComparedMesh {
     /// Reads a file's mesh relative to an origin.
     ///
     /// # Errors
@@ -34,7 +34,7 @@ impl Model {
         Ok(Self { mesh, faces })
     }
 
-    /// Whether another model has the same vertices and faces, wherever they are.
+    /// Whether another mesh has the same vertices and faces, regardless of positions.
     pub fn has_faces_of(&self, other: &Self) -> bool {
         self.faces.has_faces_of(&other.faces)
     }
