@@ -161,8 +161,8 @@ pub struct MeshFile<'a> {
 }
 
 impl MeshFile<'_> {
-    /// Writes a mesh. USD stores velocities (m/s) as an attribute, not as arrays: `velocities` gets those found among the arrays, and returns
-    /// those to write.
+    /// Writes a mesh. USD stores velocities (m/s) as an attribute, not as arrays: `velocities` gets those found among the arrays, and
+    /// returns those to write.
     pub fn write(
         &self,
         mesh: &TriMesh,

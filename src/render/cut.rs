@@ -35,9 +35,9 @@ pub struct Field {
 }
 
 impl Field {
-    /// A field that `read` samples: it gets positions (m) and puts their values into a list, which it clears first. The colours from dark blue
-    /// to pale yellow span `range`; values outside have the colours of its ends. `bounds` are the minimum and maximum corner of the part to be
-    /// drawn (m).
+    /// A field that `read` samples: it gets positions (m) and puts their values into a list, which it clears first. The colours from dark
+    /// blue to pale yellow span `range`; values outside have the colours of its ends. `bounds` are the minimum and maximum corner of the
+    /// part to be drawn (m).
     pub fn new(
         bounds: Option<(DVec3, DVec3)>,
         range: [f32; 2],

@@ -95,8 +95,8 @@ pub(super) fn shade(
     albedo.component_mul(&(sun + fill / SKY_RAYS as f64))
 }
 
-/// Share of the light that a wet surface reflects (Schlick 1994, for water), and the light that it reflects towards the camera: the sky, and a
-/// spot of the sun, blurred as by ripples.
+/// Share of the light that a wet surface reflects (Schlick 1994, for water), and the light that it reflects towards the camera: the sky,
+/// and a spot of the sun, blurred as by ripples.
 ///
 /// `toward` is the unit vector from the camera; `blocked(direction)` as in [`shade`].
 pub(super) fn gloss(

@@ -1,5 +1,5 @@
-//! Points drawn as spheres, which are rasterised into a buffer of the nearest sphere at each sample of the picture. As no rays are traced, a
-//! million points take about as long as the rest of the picture.
+//! Points drawn as spheres, which are rasterised into a buffer of the nearest sphere at each sample of the picture. As no rays are
+//! traced, a million points take about as long as the rest of the picture.
 
 use rayon::prelude::*;
 
@@ -118,8 +118,8 @@ struct Splat {
 }
 
 impl<'a> Splats<'a> {
-    /// Draws clouds with `samples` samples along each edge of a pixel. The result is the same with any number of threads, as each tile draws
-    /// its spheres in a fixed order.
+    /// Draws clouds with `samples` samples along each edge of a pixel. The result is the same with any number of threads, as each tile
+    /// draws its spheres in a fixed order.
     pub fn new(
         ctx: &Context,
         clouds: &'a [Cloud],

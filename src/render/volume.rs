@@ -24,8 +24,8 @@ impl Model {
 }
 
 impl Fog {
-    /// A fog volume. A density of 1 has the extinction (1/m) of the metadata `frazil:density_scale`, or without it `extinction` (1/m, above 0).
-    /// Inactive voxels and values below 0 are empty.
+    /// A fog volume. A density of 1 has the extinction (1/m) of the metadata `frazil:density_scale`, or without it `extinction` (1/m,
+    /// above 0). Inactive voxels and values below 0 are empty.
     ///
     /// # Errors
     /// A transform that is not linear; a scale that is not a number of 0 or more; densities too far apart to be drawn, or too many for the

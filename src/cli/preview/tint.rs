@@ -28,8 +28,8 @@ impl FromStr for Tint {
 }
 
 impl Tint {
-    /// The colours and opacities of vertices, from their depths and concentrations of dye (Lambert, Beer); none for a mesh that lacks either
-    /// array.
+    /// The colours and opacities of vertices, from their depths and concentrations of dye (Lambert, Beer); none for a mesh that lacks
+    /// either array.
     pub fn of(&self, liquid: &DetailedMesh) -> Option<Tinted> {
         let (shares, depths) = (liquid.of_vertices(&self.name)?, liquid.of_vertices("depth")?);
         let [clear, dye] = [LiquidLook::WATER, self.look].map(|look| (look.colour, 1.0 / look.depth));

@@ -126,8 +126,8 @@ enum BlockSamples {
 }
 
 impl Fog {
-    /// A fog of densities by block position (a multiple of 8 on each axis), each at most once. A density of 1 has this extinction (1/m, above
-    /// 0); density times extinction is clamped to a million.
+    /// A fog of densities by block position (a multiple of 8 on each axis), each at most once. A density of 1 has this extinction (1/m,
+    /// above 0); density times extinction is clamped to a million.
     ///
     /// # Errors
     /// Densities too far apart, or too many for the memory limit; cancel.

@@ -34,7 +34,8 @@ impl Veil {
 }
 
 impl LitFogs<'_> {
-    /// Whether one ray through the middle of a pixel suffices for all its samples: no voxel is smaller than a pixel at the middle of its fog.
+    /// Whether one ray through the middle of a pixel suffices for all its samples: no voxel is smaller than a pixel at the middle of its
+    /// fog.
     pub fn is_smooth(&self, camera: &Camera, size: Size) -> bool {
         let pixel = 2.0 * libm::tan(camera.fov_deg.to_radians() * 0.5) / f64::from(size.height);
         let is_smooth =

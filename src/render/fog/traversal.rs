@@ -160,9 +160,9 @@ fn rays_in_fogs(
     })
 }
 
-/// Marches along a ray from a point (m) in a direction (a unit vector), at most to `end` (m), through all blocks that are not empty, in steps
-/// of at most `stride` voxels. Calls `each` with the start and the end of a step (m) and the positions at its middle, one for each fog
-/// there, until it returns false.
+/// Marches along a ray from a point (m) in a direction (a unit vector), at most to `end` (m), through all blocks that are not empty, in
+/// steps of at most `stride` voxels. Calls `each` with the start and the end of a step (m) and the positions at its middle, one for each
+/// fog there, until it returns false.
 pub(super) fn march(
     fogs: &[Fog],
     (from, toward): (DVec3, DVec3),

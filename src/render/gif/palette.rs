@@ -66,8 +66,8 @@ impl Palette {
         &self.colours
     }
 
-    /// The index of a colour for each pixel of a picture. Colours are mixed by ordered dithering, whose pattern is fixed, so that parts of a
-    /// flipbook that stand still do not flicker.
+    /// The index of a colour for each pixel of a picture. Colours are mixed by ordered dithering, whose pattern is fixed, so that parts
+    /// of a flipbook that stand still do not flicker.
     pub fn indices(&self, ctx: &Context, picture: &Picture) -> Vec<u8> {
         let width = picture.size.width as usize;
         let mut out = vec![0; width * picture.size.height as usize];

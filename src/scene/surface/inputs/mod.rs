@@ -123,8 +123,8 @@ impl Inputs {
     }
 }
 
-/// The spacing (m) of the particles in the file `first`: that of the scene, or else an estimate. Adds a warning if it is estimated, or if it
-/// differs much from the estimate.
+/// The spacing (m) of the particles in the file `first`: that of the scene, or else an estimate. Adds a warning if it is estimated, or if
+/// it differs much from the estimate.
 ///
 /// # Errors
 /// Particles that allow no estimate, and no spacing in the scene.

@@ -26,8 +26,8 @@ pub struct SavedMesh {
     pub sculpted: Option<i32>,
 }
 
-/// The exact state of a mesh, with the data that it carries and the frame of the last edited mesh. Unless it was rebuilt, its data are those
-/// of the first mesh and are not stored.
+/// The exact state of a mesh, with the data that it carries and the frame of the last edited mesh. Unless it was rebuilt, its data are
+/// those of the first mesh and are not stored.
 pub fn save(tracker: &Tracker, detail: &DetailedMesh, sculpted: Option<i32>) -> Vec<u8> {
     let tracker_bytes = tracker.save();
     if !tracker.is_rebuilt() {
