@@ -78,17 +78,18 @@ pub struct FrameProgress<'a> {
 const STEADY: f64 = 0.45;
 
 /// The length of the next step (s).
-pub fn next_length(at: &FrameProgress) -> f64 {
-    let halved = f64::from(1 << at.halvings);
-    let longest = match at.params.pace {
+pub fn next_length(progress: &FrameProgress) -> f64 {
+    let halved = f64::from(1 << progress.halvings);
+    let longest = match progress.params.pace {
         TimeStepping::Exact => {
-            let longest = longest_stable(at.params, at.measures, at.deepest, at.left) / halved;
-            if (STEADY * longest..=longest).contains(&at.last) { at.last } else { longest }
+            let longest =
+                longest_stable(progress.params, progress.measures, progress.deepest, progress.left) / halved;
+            if (STEADY * longest..=longest).contains(&progress.last) { progress.last } else { longest }
         }
         TimeStepping::Realtime(longest) => longest / halved,
     };
     // Rounding of the time left must not add a step. Where nothing limits a step, it takes all the time left.
-    at.left / (at.left / longest - 1e-9).ceil().max(1.0)
+    progress.left / (progress.left / longest - 1e-9).ceil().max(1.0)
 }
 
 /// Maximum count of halvings of a step, which keep a disturbance in a fast film within a cell. Where they cannot, the film is limited.

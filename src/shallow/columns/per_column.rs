@@ -27,7 +27,7 @@ pub enum Array {
     /// Rounding remainders of transfers.
     RemainderEast,
     RemainderSouth,
-    /// Inertia factors of fast films.
+    /// Inertia divisors of fast films.
     Light,
     /// Heads of full columns.
     Head,

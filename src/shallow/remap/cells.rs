@@ -15,7 +15,7 @@ const LAYERS: usize = 16;
 
 /// A column before the change.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Old {
+pub(super) struct OldColumn {
     pub index: u32,
     pub base: i32,
     pub depth: i32,
@@ -24,7 +24,7 @@ pub(super) struct Old {
 
 /// A column after the change.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct New {
+pub(super) struct NewColumn {
     pub index: u32,
     pub base: i32,
     pub ceiling: i32,
@@ -50,8 +50,8 @@ struct Parcel {
 /// The columns of one cell, from the lowest up.
 #[derive(Debug, Clone)]
 pub(super) struct Cell {
-    pub old: Vec<Old>,
-    pub new: Vec<New>,
+    pub old: Vec<OldColumn>,
+    pub new: Vec<NewColumn>,
     /// Underside of the lowest solid after the change.
     pub under: i32,
     /// If there are several columns, one whose base moves further than this (units) counts as another one.
@@ -108,7 +108,8 @@ impl Cell {
     /// Finds for each new column the old column that it was.
     fn find_same(&mut self) {
         let reach = self.reach;
-        let is_near = |(old, new): (&Old, &New)| (i64::from(old.base) - i64::from(new.base)).abs() <= reach;
+        let is_near =
+            |(old, new): (&OldColumn, &NewColumn)| (i64::from(old.base) - i64::from(new.base)).abs() <= reach;
         let same_count = self.old.len() == self.new.len();
         if same_count && (self.old.len() == 1 || self.old.iter().zip(&self.new).all(is_near)) {
             self.new.iter_mut().zip(&self.old).for_each(|(new, old)| new.from = old.index);
@@ -121,7 +122,8 @@ impl Cell {
     /// column without a pair.
     fn align(&mut self) {
         let (rows, width) = (self.old.len(), self.new.len() + 1);
-        let pair_cost = |old: &Old, new: &New| 2 * (i64::from(old.base) - i64::from(new.base)).abs();
+        let pair_cost =
+            |old: &OldColumn, new: &NewColumn| 2 * (i64::from(old.base) - i64::from(new.base)).abs();
         refill(&mut self.costs, (0..width as i64).map(|at| at * self.reach));
         for (row, old) in self.old.iter().enumerate() {
             let before = row * width;
@@ -182,8 +184,8 @@ impl Cell {
 }
 
 /// A new column without liquid.
-pub(super) fn dry(index: usize, base: i32, ceiling: i32) -> New {
-    New { index: index as u32, base, ceiling, depth: 0, from: NONE, amounts: [0; MAX_SCALARS] }
+pub(super) fn dry(index: usize, base: i32, ceiling: i32) -> NewColumn {
+    NewColumn { index: index as u32, base, ceiling, depth: 0, from: NONE, amounts: [0; MAX_SCALARS] }
 }
 
 #[cfg(test)]
@@ -194,7 +196,7 @@ mod tests {
     /// Remaps columns of (base, depth) to columns of [base, ceiling]; returns the depths and the rest.
     fn remap(old: &[(i32, i32)], new: &[[i32; 2]]) -> (Vec<i32>, Leftover) {
         let mut cell = Cell { under: BOTTOMLESS, reach: 100, ..Cell::default() };
-        let column = |(index, &(base, depth)): (usize, &(i32, i32))| Old {
+        let column = |(index, &(base, depth)): (usize, &(i32, i32))| OldColumn {
             index: index as u32,
             base,
             depth,
@@ -244,8 +246,8 @@ mod tests {
     fn amounts_go_with_their_units() {
         let mut cell = Cell { under: BOTTOMLESS, reach: 100, ..Cell::default() };
         cell.old = vec![
-            Old { index: 0, base: 0, depth: 100, amounts: [1000, -50, 7, 0] },
-            Old { index: 1, base: 500, depth: 10, amounts: [10, 0, 0, 1 << 40] },
+            OldColumn { index: 0, base: 0, depth: 100, amounts: [1000, -50, 7, 0] },
+            OldColumn { index: 1, base: 500, depth: 10, amounts: [10, 0, 0, 1 << 40] },
         ];
         // Thirty units stay, seventy are pushed up into the former upper column.
         cell.new = vec![dry(0, 0, 30), dry(1, 500, TOP)];
@@ -257,7 +259,8 @@ mod tests {
     #[test]
     fn liquid_below_a_solid_that_hangs_does_not_get_on_top_of_it() {
         let mut cell = Cell { under: 100, reach: 10, ..Cell::default() };
-        let old = |index, base| Old { index, base, depth: 5, amounts: [7 + i64::from(base); MAX_SCALARS] };
+        let old =
+            |index, base| OldColumn { index, base, depth: 5, amounts: [7 + i64::from(base); MAX_SCALARS] };
         cell.old = vec![old(0, 20), old(1, 200)];
         cell.new = vec![dry(0, 200, TOP)];
         assert_eq!(cell.remap(), Leftover { units: 5, height: 20, displaced: 5, amounts: [27; MAX_SCALARS] });

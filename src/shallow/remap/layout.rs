@@ -1,7 +1,7 @@
 //! The new columns of rows, and the liquid that stays in them.
 
 use super::band::Band;
-use super::cells::{Cell, Leftover, Old, dry};
+use super::cells::{Cell, Leftover, OldColumn, dry};
 use super::dirty::Dirty;
 use super::held::Held;
 use super::origins::Origins;
@@ -284,7 +284,7 @@ impl Block<'_> {
             let amount = |of: &Vec<f64>| of.get(index).map_or(0, |&amount| amount as i64);
             let amounts = band.amounts.each_ref().map(amount);
             let (base, depth) = (band.base[index], band.depth[index]);
-            cell.old.push(Old { index: index as u32, base, depth, amounts });
+            cell.old.push(OldColumn { index: index as u32, base, depth, amounts });
         }
         cell.new.clear();
         cell.under = BOTTOMLESS;

@@ -2,7 +2,7 @@
 //!
 //! In a film on a slope a disturbance travels at 3 u. Where waves are slower, at c, the liquid's inertia lets each bump grow: roll waves.
 //! Liquid that advects its momentum and has surface tension grows them far more slowly, if at all. A pipe between wet columns where 3 u > c
-//! is *fast*: its inertia is reduced by a factor with which (c dt / dx)^2 is [`FAST_WAVES`]. The discharge of a steady film does not depend
+//! is *fast*: its inertia is divided so that (c dt / dx)^2 is [`FAST_WAVES`]. The discharge of a steady film does not depend
 //! on its inertia. Which pipes are fast is found at the start of each frame, from the state alone. Where steps are so long that a
 //! disturbance would pass more than a cell in one, and grow, the flux of a fast pipe is limited.
 
@@ -16,18 +16,18 @@ use crate::shallow::columns::{NONE, STRIP, resize_part, strip_from, strip_of};
 
 /// (c dt / dx)^2 of a fast pipe: below 1/2, the bound of stability.
 pub const FAST_WAVES: f32 = 0.35;
-/// Maximum inertia factor: shallower films are never fast for long.
+/// Maximum inertia divisor: shallower films are never fast for long.
 const MAX_LIGHT: f32 = 16.0;
-/// Minimum inertia factor of a fast pipe: once packed, it must differ from 1, which all other pipes have.
+/// Minimum inertia divisor of a fast pipe: once packed, it must differ from 1, which all other pipes have.
 const MIN_LIGHT: f32 = 1.0 + 1.0 / 128.0;
 
-/// Inertia factors of a column whose pipes are not fast (`packed`).
+/// Inertia divisors of a column whose pipes are not fast (`packed`).
 pub const NORMAL: u32 = 0x3f80_3f80;
 
 /// Where inertia is reduced.
 #[derive(Debug, Clone)]
 pub struct Fast {
-    /// Inertia factors of the pipes of each column, to the east and to the south ([`packed`]); of rows that have fast pipes.
+    /// Inertia divisors of the pipes of each column, to the east and to the south ([`packed`]); of rows that have fast pipes.
     pub(super) light: PerColumn<u32>,
     /// Whether each strip has fast pipes; only valid in rows that have some.
     pub(super) strips: Vec<bool>,
@@ -91,7 +91,7 @@ impl Fast {
         dispatch!(find_rows(rows: &mut [bool], films: &Films, step: f32, max_cells: u32) -> u32)
     }
 
-    /// Finds the inertia factors of the fast pipes of those rows, for steps like `step`.
+    /// Finds the inertia divisors of the fast pipes of those rows, for steps like `step`.
     pub fn reduce_inertia(&mut self, films: &Films, step: &Step) {
         let fast = self;
         dispatch!(reduce_inertia_rows(fast: &mut Fast, films: &Films, step: &Step))
@@ -246,7 +246,7 @@ fn is_fast(drive: f32, depth: [f32; 2], flux: f32) -> bool {
     (9.0 * flux * flux > drive * mean * mean * mean) & (min(depth[0], depth[1]) > 0.0)
 }
 
-/// The inertia factor of a pipe in a step; `drive` is that of the last step, which the flux refers to.
+/// The inertia divisor of a pipe in a step; `drive` is that of the last step, which the flux refers to.
 #[inline(always)]
 fn light_of(drive: f32, step: &Step, depth: [f32; 2], flux: f32) -> f32 {
     let section = min(0.5 * (depth[0] + depth[1]), step.section);
@@ -260,7 +260,7 @@ pub fn light(step: &Step, depth: [f32; 2], flux: f32) -> f32 {
     light_of(step.drive, step, depth, flux)
 }
 
-/// Packs two factors, each truncated to its upper 16 bits: the discharge of a steady film does not depend on them.
+/// Packs two inertia divisors, each truncated to its upper 16 bits: the discharge of a steady film does not depend on them.
 #[inline(always)]
 fn packed(east: f32, south: f32) -> u32 {
     east.to_bits() >> 16 | south.to_bits() & 0xffff_0000

@@ -15,8 +15,8 @@ pub struct Step {
     pub drive: f32,
     /// 3 dt nu / unit^2 (units^2).
     pub drag: f32,
-    /// [`FAST_WAVES`](super::fast_films::FAST_WAVES) divided by `drive` (units). This over a depth is the factor by which the inertia of a
-    /// fast film is reduced.
+    /// [`FAST_WAVES`](super::fast_films::FAST_WAVES) divided by `drive` (units). This over a depth is the inertia divisor of a fast
+    /// film.
     pub light_depth: f32,
     /// The maximum transfer of a pipe of a fast film in a step, as a fraction of the donor's depth.
     pub max_film_transfer: f32,
@@ -116,7 +116,7 @@ pub fn whole_and_remainder(flux: f32, remainder: f32) -> [f32; 2] {
 }
 
 /// The flux through a pipe from i to j after a step (units of depth): `fall` is eta_i - eta_j, `depth` H of both (units), `flux` the last
-/// flux; `light` is the factor by which the liquid's inertia is reduced.
+/// flux; `light` is what the inertia of the liquid is divided by.
 #[inline(always)]
 pub fn flux_of<K: StepKind>(
     step: &Step,
@@ -212,7 +212,7 @@ pub struct Row<'a> {
     pub south_depth: &'a [i32],
     /// Openness to the east and to the south.
     pub open: [&'a [f32]; 2],
-    /// Inertia factors of the pipes to the east and to the south, where reduced (`fast_films::packed`).
+    /// Inertia divisors of the pipes to the east and to the south, where reduced (`fast_films::packed`).
     pub light: &'a [u32],
     /// Strips in which some are reduced.
     pub is_light: &'a [bool],
@@ -379,7 +379,7 @@ fn flux_strip<K: StepKind, const LIGHT: bool, const RESTS: bool, const AXIS: usi
     }
 }
 
-/// Unpacks the factors of `packed`.
+/// Unpacks the divisors of `packed`.
 #[inline(always)]
 pub fn unpacked(both: u32) -> [f32; 2] {
     [both << 16, both & 0xffff_0000].map(f32::from_bits)

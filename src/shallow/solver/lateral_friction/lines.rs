@@ -372,7 +372,7 @@ impl Pass<'_> {
         [total.before(strip, 0), first.before(strip, 0), second.before(strip, 0)]
     }
 
-    /// Inertia factors of a strip's pipes.
+    /// Inertia divisors of a strip's pipes.
     #[inline(always)]
     fn light(&self, strip: usize) -> &[u32; STRIP] {
         let Liquid { columns, fast, .. } = *self.liquid;
