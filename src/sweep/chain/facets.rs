@@ -209,7 +209,7 @@ impl Clipper<'_> {
             OPEN_AND_LOOSE => out.push((v, true)),
             _ if own & SPECK != 0 => out.push((v, false)),
             _ if own == SLIVER | OPEN && nearby & STACK != 0 => out.push((v, false)),
-            _ if nearby & LOOSE == 0 || nearby & !(STACK | LOOSE) == BURIED => {}
+            _ if is_left_out(nearby) => {}
             _ => {
                 self.split(id, v, own & (OPEN | BURIED), hair, bin_flags, out);
             }
@@ -227,7 +227,7 @@ impl Clipper<'_> {
         nearby
     }
 
-    /// Adds the open parts of a part of a face; returns whether it is open at all its samples.
+    /// Adds the open parts of a part of a face, halved as far as necessary; returns whether it is open at all its samples.
     fn dice(&mut self, id: usize, v: Corners, hair: Point, bin_flags: &[u8], out: &mut Vec<Part>) -> bool {
         match self.nearby_flags(id, v, bin_flags) {
             // No flags: no distance is wanted there.
@@ -235,7 +235,7 @@ impl Clipper<'_> {
                 out.push((v, true));
                 true
             }
-            nearby if nearby & LOOSE == 0 || nearby & !(STACK | LOOSE) == BURIED => false,
+            nearby if is_left_out(nearby) => false,
             _ => {
                 let exposed = self.exposure.is_exposed_within(id as u32, extent(&v));
                 let own = self.sampled(&v, hair) | if exposed { OPEN } else { 0 };
@@ -347,6 +347,11 @@ impl Clipper<'_> {
     fn is_sampled(&self, at: Point) -> bool {
         self.bins.of_voxel(voxel_of(at)).is_some_and(|bin| !self.exposure.stacks[bin])
     }
+}
+
+/// Whether a face in bins with these flags has no facets: only patches make the surface there, or all faces are buried.
+fn is_left_out(nearby: u8) -> bool {
+    nearby & LOOSE == 0 || nearby & !(STACK | LOOSE) == BURIED
 }
 
 /// Whether one sample is enough for a part of a face.

@@ -22,7 +22,7 @@ use crate::sweep::window::Window;
 
 /// Factor on the number of steps at which a vertex' path in a step is as long as the pieces that edges are split into; by measurement, this
 /// value gave the fewest faces and the shortest time.
-const SHORTER: f64 = 1.5;
+const STEP_FACTOR: f64 = 1.5;
 /// The faces of edges need at most as many steps as paths of this length (cells) do, or [`MAX_OVER_ARCS`] times as many as arcs do,
 /// whichever is more; also measured.
 const MIN_PATH: f64 = 4.0;
@@ -348,7 +348,7 @@ impl Body {
             let [i, j] = edge.map(|vertex| vertex as usize);
             let path_length = (ends[1][i] - ends[0][i]).norm().max((ends[1][j] - ends[0][j]).norm());
             let length = (ends[0][i] - ends[0][j]).norm().max((ends[1][i] - ends[1][j]).norm());
-            let steps = SHORTER * (error / tolerance * path_length / length).sqrt();
+            let steps = STEP_FACTOR * (error / tolerance * path_length / length).sqrt();
             steps.min((path_length / MIN_PATH).max(MAX_OVER_ARCS * arcs))
         };
         let twists =
