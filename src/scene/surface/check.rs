@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::Inputs;
 use super::estimate::disk::FrameSize;
-use super::estimate::memory::MaxBytes;
+use super::estimate::memory::ParticleMaxima;
 use super::inputs::all_files;
 use super::inputs::particle_times::read;
 use crate::context::Context;
@@ -82,11 +82,11 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     let (mut has_ids, mut has_velocities) = (true, true);
     let files = all_files(scene, surface);
     let (mut before, mut has_warned): (Option<Particles>, bool) = (None, false);
-    let mut max_bytes = MaxBytes::default();
+    let mut maxima = ParticleMaxima::default();
     for path in &files {
         ctx.check()?;
         let particles = read(path, surface, &inputs.input_hashes)?;
-        ctx.pool().install(|| max_bytes.add(&particles, inputs.spacing, surface.cell));
+        ctx.pool().install(|| maxima.add(&particles, inputs.spacing, surface.cell));
         if let Some(before) = before.take().filter(|_| !has_warned) {
             // Particles with neither ids nor velocities are reported below.
             let compared = || disagreement(&before, &particles, 1.0 / shot.fps, inputs.spacing);
@@ -143,7 +143,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
         triangles: mesh.triangles.len(),
         size_m: (high - low).into(),
         edge_m: edge,
-        memory_bytes: max_bytes.estimate(surface, files.len(), &inputs.mesh, &frame),
+        memory_bytes: maxima.estimate(surface, files.len(), &inputs.mesh, &frame),
         disk_bytes: count * frame.sum(),
         frame_bytes: frame.sum(),
         warnings,

@@ -44,18 +44,18 @@ pub(in crate::scene::snow) fn foot_slip(
     }
     let play = Play { node: object.node.clone(), clip: object.clip.clone(), repeat: false, start: 0.0 };
     let clip = Character::open(&object.file, play)?;
-    let round = clip.duration();
+    let cycle = clip.duration();
     let clip = Placed::new(Box::new(clip), object.space, Keys::default());
-    let Some(clip_gait) = gait(&clip, 0.0, round)?.filter(|gait| gait.is_steady()) else { return Ok(None) };
+    let Some(clip_gait) = gait(&clip, 0.0, cycle)?.filter(|gait| gait.is_steady()) else { return Ok(None) };
     let frames = scene.shot.frames;
     let start = scene.shot.time(frames.first);
-    let end = (start + round).min(scene.shot.time(frames.last));
+    let end = (start + cycle).min(scene.shot.time(frames.last));
     let Some(moved_gait) = gait(moved, start, end)? else { return Ok(None) };
     let (speed, slips) = (clip_gait.velocity.norm(), moved_gait.velocity.norm());
     Ok(Some(FootSlip {
         carry_m_per_s: clip_gait.carry().into(),
-        stride_m: speed * round,
-        round_s: round,
+        stride_m: speed * cycle,
+        round_s: cycle,
         standing: clip_gait.standing,
         slips_m_per_s: slips,
         keys: keys(scene, object, clip_gait.carry())?,

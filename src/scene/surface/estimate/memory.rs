@@ -86,7 +86,7 @@ const REACH: f64 = 2.0;
 
 /// Maxima, over all particle files, of what the estimate depends on.
 #[derive(Debug, Default)]
-pub(in crate::scene::surface) struct MaxBytes {
+pub(in crate::scene::surface) struct ParticleMaxima {
     /// Bytes of a frame's particles.
     frame: f64,
     /// Bytes of their paths.
@@ -103,7 +103,7 @@ pub(in crate::scene::surface) struct MaxBytes {
     edge: f64,
 }
 
-impl MaxBytes {
+impl ParticleMaxima {
     /// Adds the particles of a file, with a spacing of `spacing` (m) and cells of `cell` (r).
     pub fn add(&mut self, particles: &Particles, spacing: f64, cell: f64) {
         let count = particles.positions.len() as f64;
@@ -267,7 +267,7 @@ mod tests {
 
     /// The bytes for rebuilding a cube's mesh, with particles at these positions, on cells of `cell` (spacings).
     fn rebuilding(positions: Vec<DVec3>, cell: f64, detail: &DetailedMesh) -> f64 {
-        let mut maxima = MaxBytes::default();
+        let mut maxima = ParticleMaxima::default();
         maxima.add(&Particles { positions, ..Particles::default() }, 1.0, cell);
         maxima.rebuilding(detail, 0)
     }

@@ -23,7 +23,8 @@ use crate::surface::{Implicit, Isosurface, Particles, estimate_spacing, rough_sp
 use particle_times::Liquid;
 
 /// Arrays of input meshes that are dropped: each frame writes its own, or they are invalid once the mesh moves.
-pub(super) const REPLACED: [&str; 9] = ["vx", "vy", "vz", "delta", "flagged", "rebuilt", "nx", "ny", "nz"];
+pub(super) const DROPPED_ARRAYS: [&str; 9] =
+    ["vx", "vy", "vz", "delta", "flagged", "rebuilt", "nx", "ny", "nz"];
 /// A spacing that differs from the estimate by more than this factor is probably a mistake.
 const MAX_RATIO: f64 = 2.0;
 
@@ -112,7 +113,7 @@ impl Inputs {
             Some(_) if surface.rebuild => detail_retention(&mesh).unwrap_or_default(),
             _ => Vec::new(),
         };
-        mesh.arrays.retain(|array| !REPLACED.contains(&&*array.name));
+        mesh.arrays.retain(|array| !DROPPED_ARRAYS.contains(&&*array.name));
         let mesh = Arc::new(mesh);
         let mut inputs =
             Self { mesh, detail_retention, spacing, begins, particles, sculpts, input_hashes, warnings };

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{REPLACED, detail_retention, read_mesh};
+use super::{DROPPED_ARRAYS, detail_retention, read_mesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::mesh::attributes::{Number, On};
@@ -12,7 +12,7 @@ use crate::scene::Frames;
 use crate::scene::surface::{Inputs, Surface};
 
 /// Arrays of shares: floats 0..=1 correspond to bytes 0 to 255.
-const SHARES: [&str; 5] = ["red", "green", "blue", "alpha", "detail"];
+const SHARE_ARRAYS: [&str; 5] = ["red", "green", "blue", "alpha", "detail"];
 
 /// An edited mesh that replaces the tracked one.
 pub struct Sculpt {
@@ -96,10 +96,10 @@ pub fn read_sculpt(ctx: &Context, surface: &Surface, inputs: &Inputs, frame: i32
 /// A mesh with the same data as that of the first frame, so that all frames have the same; and the differences, a sentence each.
 fn conformed(edited: DetailedMesh, first: &DetailedMesh) -> (DetailedMesh, Vec<String>) {
     let DetailedMesh { mesh, uvs, mut arrays } = edited;
-    arrays.retain(|array| !REPLACED.contains(&&*array.name));
+    arrays.retain(|array| !DROPPED_ARRAYS.contains(&&*array.name));
     let (vertices, faces) = (mesh.positions.len(), mesh.triangles.len());
     let (mut missing, mut faults): (Vec<&str>, Vec<String>) = (Vec::new(), Vec::new());
-    let mut taken = Vec::with_capacity(first.arrays.len());
+    let mut out = Vec::with_capacity(first.arrays.len());
     for wanted in &first.arrays {
         let found = arrays.iter().find(|array| array.name == wanted.name && array.on == wanted.on);
         let values = match found {
@@ -109,7 +109,7 @@ fn conformed(edited: DetailedMesh, first: &DetailedMesh) -> (DetailedMesh, Vec<S
                 vec![0.0; wanted.on.count(vertices, faces)]
             }
         };
-        taken.push(MeshArray { name: wanted.name.clone(), on: wanted.on, number: wanted.number, values });
+        out.push(MeshArray { name: wanted.name.clone(), on: wanted.on, number: wanted.number, values });
     }
     // Detail retention is used even if the first mesh has no such array.
     let is_used = |array: &MeshArray| {
@@ -154,22 +154,22 @@ fn conformed(edited: DetailedMesh, first: &DetailedMesh) -> (DetailedMesh, Vec<S
         let names = ignored.join(", ");
         faults.push(format!("carries what the first frame's mesh does not, which is left out: {names}"));
     }
-    (DetailedMesh { mesh, uvs, arrays: taken }, faults)
+    (DetailedMesh { mesh, uvs, arrays: out }, faults)
 }
 
 /// The numbers of an array, converted to another type.
 fn converted(array: &MeshArray, to: Number) -> Vec<f64> {
-    let is_share = SHARES.contains(&&*array.name);
+    let is_share = SHARE_ARRAYS.contains(&&*array.name);
     let scaled = |value: f64| match (array.number, to) {
         (Number::U8, to) if is_share && to.is_float() => value / 255.0,
         (from, Number::U8) if is_share && from.is_float() => value * 255.0,
         _ => value,
     };
-    array.values.iter().map(|value| fitted(scaled(*value), to)).collect()
+    array.values.iter().map(|value| nearest_of_type(scaled(*value), to)).collect()
 }
 
 /// The nearest number of a type; NaN becomes 0 if the type has none.
-fn fitted(value: f64, to: Number) -> f64 {
+fn nearest_of_type(value: f64, to: Number) -> f64 {
     let (low, high) = match to {
         Number::F64 => return value,
         Number::F32 => return f64::from(value as f32),

@@ -92,7 +92,7 @@ impl<'a> TrackedShot<'a> {
     /// Particles or an edited mesh that can no longer be read.
     pub fn resume(
         ctx: &Context,
-        of @ (_, surface, inputs): (&'a Scene, &'a Surface, &'a Inputs),
+        context @ (_, surface, inputs): (&'a Scene, &'a Surface, &'a Inputs),
         frame: i32,
         SavedMesh { mut tracker, detail, sculpted }: SavedMesh,
     ) -> Result<Self> {
@@ -107,7 +107,7 @@ impl<'a> TrackedShot<'a> {
         let source = Source::of(ctx, surface.rebuild, None, inputs.mesh.clone(), &inputs.particles);
         // The frame's files and report exist: its report is not used.
         let tracked = TrackedFrame { detail, ..TrackedFrame::new(tracker, source, Report::default()) };
-        let mut shot = Self::new(of, frame, tracked);
+        let mut shot = Self::new(context, frame, tracked);
         if let Some(sculpted) = sculpted {
             let source = match read_sculpt(ctx, surface, inputs, sculpted)? {
                 Some(sculpt) => {
