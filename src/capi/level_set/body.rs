@@ -136,8 +136,8 @@ pub(in crate::capi) struct Surface {
 }
 
 impl Surface {
-    /// A body with this surface.
-    pub(in crate::capi) fn of<'a>(&self, body: &'a Body) -> Object<'a> {
+    /// A body with these surface properties.
+    pub(in crate::capi) fn object<'a>(&self, body: &'a Body) -> Object<'a> {
         Object { stick: self.stick, compression: self.compression, ..Object::new(body, self.friction) }
     }
 }

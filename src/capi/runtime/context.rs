@@ -327,12 +327,12 @@ pub unsafe extern "C" fn frz_context_set_poll(
         let user = User(user);
         let call_start = call.0.call_start.clone();
         call.ctx().set_poll(poll.map(|poll| {
-            let ask = move |progress: &Progress| {
+            let call_host = move |progress: &Progress| {
                 let reported = progress_of(progress, &call_start);
                 // SAFETY: the host guarantees a function that takes these.
                 unsafe { poll(user.pointer(), &reported) != 0 }
             };
-            Box::new(ask) as crate::context::Poll
+            Box::new(call_host) as crate::context::Poll
         }));
         Ok(())
     })
@@ -357,12 +357,12 @@ pub unsafe extern "C" fn frz_context_set_log(
         let call = unsafe { enter(context) }?;
         let user = User(user);
         call.ctx().set_log(log.map(|log| {
-            let tell = move |text: &str| {
+            let call_host = move |text: &str| {
                 let text = CString::new(text.replace('\0', "")).unwrap_or_default();
                 // SAFETY: the host guarantees a function that takes these.
                 unsafe { log(user.pointer(), text.as_ptr()) };
             };
-            Box::new(tell) as crate::context::Log
+            Box::new(call_host) as crate::context::Log
         }));
         Ok(())
     })

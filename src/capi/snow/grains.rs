@@ -127,7 +127,7 @@ impl GrainsHandle {
             let (count, resting) = (self.grains.count() as u64, self.grains.resting() as u64);
             return Ok(frz_grains_report { count, resting, ..frz_grains_report::zeroed() });
         }
-        let objects: Vec<_> = bodies.iter().map(|(body, surface)| surface.of(body)).collect();
+        let objects: Vec<_> = bodies.iter().map(|(body, surface)| surface.object(body)).collect();
         let Ground { floor, lowest } = self.ground;
         let around = Surroundings { base, objects: &objects, statics: &[], ground: &[], floor, lowest };
         let done = self.grains.step(ctx, &around, [0.0, dt], frame)?;
