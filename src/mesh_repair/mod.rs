@@ -84,13 +84,13 @@ pub struct RepairReport {
     pub rebuild_level: usize,
     /// New triangles with an altitude below 1e-4 of an edge.
     pub slivers: usize,
-    /// What it has lost.
+    /// Losses of area, volume and extent.
     pub losses: Losses,
 }
 
-/// How often a set of cells may grow by cells that cannot be cut.
+/// Maximum times that a set of cells grows by cells that cannot be cut.
 const TRIES: usize = 32;
-/// How often slivers are removed.
+/// Maximum rounds of sliver removal.
 const ROUNDS: usize = 4;
 /// Memory (bytes) for the area of a cell's face: a mesh of that area pierces up to 1.7 edges of the grid, some 150 bytes each while they
 /// are sorted.

@@ -1,4 +1,4 @@
-//! How a figure stands: its lowest parts, and how they move while on the ground.
+//! Gait analysis: how the lowest parts of a figure move while they are on the ground.
 //!
 //! Walk cycles usually walk in place: the standing foot moves backwards under the figure. If the figure is carried forwards at that speed,
 //! the foot stays where it stands.

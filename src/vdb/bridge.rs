@@ -56,7 +56,7 @@ pub(super) mod ffi {
     /// An attribute of points to be stored.
     struct PointArray {
         name: String,
-        /// Its type, as `kind` of `vdb/points.rs` numbers it.
+        /// Its type, as `kind` of `vdb/point_arrays.rs` numbers it.
         kind: i32,
         /// Whether all points share one value.
         uniform: bool,

@@ -1,4 +1,4 @@
-//! What is known of a grid of a file before it is read.
+//! Descriptions of grids in files, known before their values are read.
 
 use crate::vdb::grid::MetaValue;
 

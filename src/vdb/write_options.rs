@@ -1,4 +1,4 @@
-//! How .vdb files are written.
+//! Options for writing .vdb files.
 
 use super::grid::MetaValue;
 use crate::io::files::hash::Hasher;

@@ -79,7 +79,7 @@ pub fn second_differences([before, here, after]: [&TriMesh; 3]) -> Option<Deviat
 struct Sample {
     at: DVec3,
     distance: f64,
-    /// Its weight.
+    /// The area that it represents (m2), or 1.
     weight: f64,
 }
 

@@ -159,7 +159,7 @@ struct Node {
     parent: usize,
     /// The first of two children, or none.
     children: Option<[usize; 2]>,
-    /// Its points in `order`.
+    /// Range of its points in `order`.
     range: std::ops::Range<usize>,
 }
 

@@ -186,8 +186,8 @@ impl<'a> Sweep<'a> {
         }
     }
 
-    /// Where a corner belongs in the list, all edges before it being below the corner: the run's index in the order, and an index in the
-    /// run.
+    /// The position in the list at which a corner belongs, after all edges that are below it: the run's index in the order, and an index in
+    /// the run.
     fn position(&self, corner: usize, other: usize) -> Option<(usize, usize)> {
         let run = self.order.partition_point(|&run| self.is_above(self.runs[run][0], corner, other));
         let run = run.checked_sub(1)?;
@@ -288,7 +288,7 @@ fn cut_monotone(positions: &[[i64; 2]], rank: &[usize], piece: &[usize], out: &m
         };
         let (top, was_lower) = stack[stack.len() - 1];
         if stack.len() > 1 && (was_lower != is_lower || lower > upper) {
-            // All waiting corners are visible from the other side.
+            // All corners on the stack are visible from the other side.
             for pair in stack.windows(2) {
                 let ((a, _), (b, _)) = (pair[0], pair[1]);
                 if was_lower { add(a, b, next) } else { add(b, a, next) }

@@ -57,7 +57,7 @@ pub(in crate::io) struct Words<'a> {
 }
 
 impl<'a> Words<'a> {
-    /// All of a text.
+    /// The words of a whole text.
     pub fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, at: 0, line: 1 }
     }

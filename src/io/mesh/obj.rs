@@ -70,7 +70,7 @@ struct Reader {
     origin: [f64; 3],
     mesh: PolygonMesh,
     coordinates: Vec<[f32; 2]>,
-    /// For each corner its index into `coordinates`, or none.
+    /// For each corner its index into `coordinates`, or [`uvs::NONE`].
     corner_uvs: Vec<u32>,
     /// Red, green and blue of the vertices, as long as all have them.
     colours: Vec<[f32; 3]>,

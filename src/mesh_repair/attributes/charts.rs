@@ -1,4 +1,4 @@
-//! Where new triangles lie on the first mesh.
+//! Charts: where on the first mesh the liquid of new triangles was.
 
 use rayon::prelude::*;
 
@@ -15,7 +15,7 @@ pub(in crate::mesh_repair::attributes) const TORN: f64 = 3.0;
 
 /// A new triangle that takes the values of the first frame.
 pub(in crate::mesh_repair) struct Chart {
-    /// Its number in the new mesh.
+    /// Index of the triangle in the new mesh.
     pub number: usize,
     /// Index of each corner among the charts' vertices.
     pub slots: [usize; 3],
@@ -31,9 +31,9 @@ pub(in crate::mesh_repair) struct Charts<'a> {
     pub first: &'a DetailedMesh,
     /// Ascending.
     pub list: Vec<Chart>,
-    /// Their vertices in the new mesh, ascending.
+    /// Vertices of the charted triangles in the new mesh, ascending.
     pub vertices: Vec<u32>,
-    /// For each of these, the position of the first mesh nearest to where the liquid there was.
+    /// For each of these vertices, the position on the first mesh that is nearest to where its liquid was.
     pub spots: Vec<Spot>,
 }
 
@@ -90,7 +90,7 @@ impl<'a> Charts<'a> {
         self.vertices.partition_point(|other| *other < vertex)
     }
 
-    /// Where on the first mesh a spot is (m).
+    /// The position of a spot (m).
     pub fn position(&self, spot: &Spot) -> DVec3 {
         self.at(spot.triangle, &spot.weights)
     }
@@ -101,7 +101,7 @@ impl<'a> Charts<'a> {
         a * weights[0] + b * weights[1] + c * weights[2]
     }
 
-    /// For each of the charts' vertices, whether it was there before, or is also used by another triangle.
+    /// For each of the charts' vertices, whether it existed before, or another triangle uses it too.
     pub fn kept(&self, vertices: &[Option<u32>], triangles: &[[u32; 3]]) -> Vec<bool> {
         let mut is_kept: Vec<bool> = vertices.iter().map(Option::is_some).collect();
         for corners in self.others(triangles).map(|number| &triangles[number]) {

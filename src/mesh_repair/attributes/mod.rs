@@ -99,7 +99,7 @@ enum Origin {
     Position(usize, Weights),
 }
 
-/// Where all values come from.
+/// The origins of all values.
 struct Origins<'a> {
     /// The triangles of the old mesh.
     old: &'a [[u32; 3]],

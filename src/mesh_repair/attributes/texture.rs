@@ -30,7 +30,7 @@ const SWEEPS: usize = 48;
 const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 
 /// Writes the coordinates of the first frame into those that a mesh has from the previous mesh; `is_kept` is, for each of the charts'
-/// vertices, whether it was there before, or is also used by another triangle. If coordinates are stored at vertices, charted triangles with
+/// vertices, whether it existed before, or another triangle uses it too. If coordinates are stored at vertices, charted triangles with
 /// a vertex that keeps a coordinate from far away are torn.
 pub(in crate::mesh_repair) fn textured(
     charts: &mut Charts<'_>,

@@ -12,11 +12,11 @@ use crate::mesh_repair::fill::Fill;
 pub struct Draft {
     /// Positions of the vertices (cells): those of the mesh first, then new ones.
     pub positions: Vec<DVec3>,
-    /// Which vertices were made here; the others are the mesh's own and never change.
+    /// Whether each vertex is new; the others are vertices of the mesh and never change.
     pub is_made: Vec<bool>,
     /// Counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// For each triangle.
+    /// The source of each triangle.
     pub sources: Vec<Source>,
 }
 

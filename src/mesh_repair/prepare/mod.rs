@@ -63,7 +63,7 @@ fn collapsed(triangles: &[[u32; 3]]) -> Vec<bool> {
     triangles.iter().map(|[a, b, c]| a == b || b == c || c == a).collect()
 }
 
-/// Which triangles without area are removed: those without which fewer edges are open. A needle between others, with one triangle on one
+/// Marks the triangles without area whose removal leaves fewer edges open. A needle between others, with one triangle on one
 /// edge and two on another, stays.
 fn loose_needles(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<bool> {
     let mut is_out = vec![false; triangles.len()];

@@ -35,7 +35,7 @@ pub(super) struct Parsed {
     pub has_materials: bool,
 }
 
-/// Where the data of a buffer view compressed by meshoptimizer is.
+/// Location and format of the data of a buffer view compressed by meshoptimizer.
 pub(super) struct Compressed {
     pub buffer: usize,
     pub offset: usize,

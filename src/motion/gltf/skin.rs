@@ -60,7 +60,7 @@ pub(super) struct Vertices {
 /// The vertices in the order of the file: primitive by primitive of each node, in the accessor's order.
 #[derive(Default)]
 pub(super) struct FileVertices {
-    /// For each, the vertex that moves like it.
+    /// For each vertex of the file, the one of [`Vertices`] that moves like it.
     pub vertices: Vec<u32>,
     /// The same triangles as `Vertices` has, in the same order, over these vertices.
     pub triangles: Vec<[u32; 3]>,

@@ -74,7 +74,7 @@ impl Guard {
     /// As [`crate::vdb::file::describe`].
     ///
     /// # Errors
-    /// As there; [`Error::Cancelled`]; a program that cannot be started.
+    /// As [`crate::vdb::file::describe`]; [`Error::Cancelled`]; a program that cannot be started.
     pub fn describe(&self, path: &Path) -> Result<Vec<GridInfo>> {
         match self.decode_in_child(path, Wanted::Infos)? {
             Contents::Infos(infos) => Ok(infos),

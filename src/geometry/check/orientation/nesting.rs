@@ -34,7 +34,7 @@ pub(super) struct Shape {
     pub(super) is_bottomless: bool,
 }
 
-/// What to turn so that no part is empty that should be solid.
+/// The parts to turn so that none is empty that should be solid.
 pub(super) struct Turns {
     /// For each part, whether it must be turned.
     pub(super) turned: Vec<bool>,

@@ -1,4 +1,4 @@
-//! Which triangles of a mesh are turned or left out, and what remains ambiguous.
+//! Which triangles of a mesh are flipped or left out, and what remains ambiguous.
 
 /// What an open part bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -20,14 +20,14 @@ const CAPS: f64 = 0.05;
 #[derive(Default)]
 pub(super) struct Pieces<'a> {
     positions: &'a [DVec3],
-    /// Their corners: vertices of the mesh if a part is closed by its indices, else joined ones; if there are both, joined ones are
-    /// numbered from the number of vertices on.
+    /// Corners of each triangle: vertices of the mesh in parts that are closed by their indices, else joined vertices. If there are both, the
+    /// number of vertices is added to the indices of the joined ones.
     named: Vec<[u32; 3]>,
-    /// Their indices in the mesh.
+    /// Index of each triangle in the mesh.
     numbers: Vec<u32>,
     /// The part of each triangle.
     part: Vec<u32>,
-    /// For each part, by its name, whether it is open.
+    /// Whether each part is open, indexed by the name of the part.
     is_open: Vec<bool>,
 }
 
