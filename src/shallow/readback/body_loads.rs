@@ -133,7 +133,7 @@ impl Shallow {
     fn level(&self, column: usize) -> Option<f64> {
         let depth = self.flow.depth[column];
         let eta = f64::from(self.columns.bases()[column]) + f64::from(depth);
-        (depth > 0).then(|| eta + f64::from(self.flow.network.over()[column].max(0.0)))
+        (depth > 0).then(|| eta + f64::from(self.flow.network.excess_heads()[column].max(0.0)))
     }
 
     /// Whether a column is flooded up to its ceiling, within the tolerance of the solver.
