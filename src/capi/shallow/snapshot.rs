@@ -33,7 +33,7 @@ pub(in crate::capi) struct SnapshotHandle {
 }
 
 impl SnapshotHandle {
-    fn new(ctx: &Context, liquid: &ShallowHandle) -> Outcome<Self> {
+    fn new(ctx: &Context, liquid: &Reading<'_, ShallowHandle>) -> Outcome<Self> {
         ctx.allow("the snapshot", liquid.shallow.columns().len() as u64 * BYTES_PER_INDEX)?;
         let snapshot = Snapshot::new(&liquid.shallow);
         let mut surface = Surface::default();
@@ -46,7 +46,7 @@ impl SnapshotHandle {
         Ok(handle)
     }
 
-    fn take(&mut self, liquid: &ShallowHandle) {
+    fn take(&mut self, liquid: &Reading<'_, ShallowHandle>) {
         self.snapshot.take(&liquid.shallow);
         self.copy_found(liquid);
     }

@@ -98,8 +98,8 @@ unsafe fn layer_of(ctx: &Context, desc: &frz_snow_desc) -> Outcome<FloatGrid> {
         };
         let area = surfaces(&ground, &cover, &statics);
         ctx.allow("the layer of snow", surface_bytes(area, desc.voxel_size))?;
-        let half_width = desc.half_width as f32;
-        Ok(ctx.polled(|| layer(ctx, &ground, &statics, &cover, desc.voxel_size, half_width))?)
+        let (voxel_size, half_width) = (desc.voxel_size, desc.half_width as f32);
+        Ok(ctx.polled(|| layer(ctx, &ground, &statics, &cover, voxel_size, half_width))?)
     }
 }
 
