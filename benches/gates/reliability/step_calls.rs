@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use frazil::capi::frz_status::*;
 use frazil::capi::shallow::flow_points::*;
+use frazil::capi::shallow::handle::*;
 use frazil::capi::shallow::liquid::*;
 use frazil::capi::shallow::params::*;
 use frazil::capi::shallow::sources::*;
-use frazil::capi::shallow::spill::*;
 use frazil::capi::shallow::terrain::*;
 use frazil::capi::shallow_two_level::ground::*;
 use frazil::capi::shallow_two_level::liquid::*;

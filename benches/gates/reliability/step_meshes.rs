@@ -12,7 +12,7 @@ use frazil::capi::snow::grains::*;
 use frazil::capi::snow::layer::*;
 use frazil::capi::snow::mist::*;
 use frazil::capi::tracker::eased::*;
-use frazil::capi::tracker::follower::*;
+use frazil::capi::tracker::handle::*;
 use frazil::capi::tracker::mesh::*;
 use frazil::geometry::TriMesh;
 

@@ -6,7 +6,7 @@ use std::ptr::{null, null_mut};
 
 use frazil::capi::mesh::triangles::*;
 use frazil::capi::tracker::eased::frz_tracker_read_eased;
-use frazil::capi::tracker::follower::*;
+use frazil::capi::tracker::handle::*;
 use frazil::capi::tracker::mesh::*;
 use frazil::capi::{frz_span, frz_status};
 use frazil::geometry::{DVec3, TriMesh, Vec3};
