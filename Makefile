@@ -1,6 +1,7 @@
 # frazil: `make demo` shows what it does, `make test` checks it.
 
-PACKAGES := libopenvdb-dev libboost-dev libboost-iostreams-dev g++ cmake pkg-config clang-format python3-openvdb python3-numpy libopenvdb-tools cbindgen-web patchelf mono-mcs mono-runtime
+BUILD_PACKAGES := libopenvdb-dev libboost-dev libboost-iostreams-dev g++
+PACKAGES := $(BUILD_PACKAGES) cmake pkg-config clang-format python3-openvdb python3-numpy libopenvdb-tools cbindgen-web patchelf mono-mcs mono-runtime
 RUST_NEEDED := 1.89
 DEMO := target/demo
 PREFIX := /usr/local
@@ -11,17 +12,21 @@ BUILD := cargo build --release -p frazil -p make_scenes --lib --bin frazil --bin
 # name, and moves away; `$(BUILD)` puts the whole one back.
 CORE := cargo build --release -p frazil --no-default-features --lib && mkdir -p target/core && cp target/release/libfrazil.a target/core/
 
-.PHONY: setup setup-core demo test test-hosts test-core test-clients test-dist sanitize fuzz deny msrv site skinning-numbers pictures lint gates bench header install install-core hosts hosts-core dist
+.PHONY: setup setup-build setup-core demo test test-hosts test-core test-clients test-dist sanitize fuzz deny msrv site skinning-numbers pictures lint gates bench header install install-core hosts hosts-core dist
 
-# Everything a build needs, from Debian's packages; quick when it is there.
+# Everything that building and testing need, from Debian's packages; quick when it is there.
 setup:
 	@./tools/setup "$(RUST_NEEDED)" $(PACKAGES)
+
+# What a build needs.
+setup-build:
+	@./tools/setup "$(RUST_NEEDED)" $(BUILD_PACKAGES)
 
 # What the core library's build needs.
 setup-core:
 	@./tools/setup "$(RUST_NEEDED)" gcc libc6-dev
 
-demo: setup
+demo: setup-build
 	rm -rf $(DEMO)
 	$(BUILD)
 	target/release/make_scenes $(DEMO)
@@ -68,13 +73,13 @@ demo: setup
 lint:
 	@if cargo fmt --version >/dev/null 2>&1; then cargo fmt --all --check; else echo "lint: rustfmt is not installed, skipped"; fi
 	@if cargo clippy --version >/dev/null 2>&1; then cargo clippy --release --workspace --all-targets -- -D warnings; else echo "lint: clippy is not installed, skipped"; fi
+	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps --lib
 	clang-format --dry-run -Werror cpp/*.cc cpp/*.h
 
 # What cannot run for want of data or of another program is listed at the end.
 test: setup
 	@mkdir -p target && rm -f target/skipped.txt
 	cargo test --release
-	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps --lib
 	./tools/bare-cli
 	@$(MAKE) --no-print-directory test-hosts
 	@$(MAKE) --no-print-directory test-core
@@ -85,7 +90,7 @@ header: setup
 	./tools/header include/frazil.h
 
 # The program, the C library, its header, and what finds them: make install [PREFIX=/usr/local] [DESTDIR=]
-install: setup
+install: setup-build
 	$(BUILD)
 	./tools/install "$(DESTDIR)$(PREFIX)"
 

@@ -48,16 +48,19 @@ fn main() {
     let out = PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo sets it"));
     let archive = out.join(format!("lib{ARCHIVE}.a"));
     let of_library = library(&roots).and_then(|library| symbols(&["-D", "--defined-only"], &library));
-    let is_compiled = of_library.is_some_and(|mut defined| {
-        compile(&roots, &out, Some(TREES));
-        defined.extend(symbols(&["--defined-only"], &archive).unwrap_or_default());
-        // A library of another distribution may lack some symbols.
-        symbols(&["--undefined-only"], &archive).is_some_and(|needed| needed.is_subset(&defined))
+    let bridge = cxx_build::bridge("src/vdb/bridge.rs");
+    std::thread::scope(|scope| {
+        scope.spawn(|| compile_loops(&roots, &out));
+        let is_compiled = of_library.is_some_and(|mut defined| {
+            compile(bridge.clone(), &roots, &out, Some(TREES));
+            defined.extend(symbols(&["--defined-only"], &archive).unwrap_or_default());
+            // A library of another distribution may lack some symbols.
+            symbols(&["--undefined-only"], &archive).is_some_and(|needed| needed.is_subset(&defined))
+        });
+        if !is_compiled {
+            compile(bridge, &roots, &out, None);
+        }
     });
-    if !is_compiled {
-        compile(&roots, &out, None);
-    }
-    compile_loops(&roots, &out);
     println!("cargo:rustc-link-lib=openvdb");
     println!("cargo:rustc-link-lib=tbb");
 }
@@ -68,9 +71,8 @@ const LOOPS: [&str; 2] = ["file.cc", "sample.cc"];
 /// Name of the static library of [`SOURCES`].
 const ARCHIVE: &str = "frazil_openvdb";
 
-/// Compiles the sources, with a macro defined.
-fn compile(roots: &[PathBuf], out: &Path, defined: Option<&str>) {
-    let mut build = cxx_build::bridge("src/vdb/bridge.rs");
+/// Compiles the bridge and its sources, with a macro defined.
+fn compile(mut build: cc::Build, roots: &[PathBuf], out: &Path, defined: Option<&str>) {
     // Compiles in half the time of level 3, and runs as fast where the time is spent in OpenVDB's library.
     configure(&mut build, roots).opt_level(1);
     defined.iter().for_each(|name| {

@@ -12,13 +12,19 @@ const README: &str = include_str!("../../../README.md");
 const CLI: &str = include_str!("../../../docs/cli.md");
 const SCENE: &str = include_str!("../../../docs/scene.md");
 
+/// The size of pictures: small ones show as much.
+const SIZE: &str = "160x90";
+
 /// Runs a line `frazil ...` in a folder and gives what it says on stdout.
 #[track_caller]
 fn works(folder: &Path, line: &str) -> String {
-    let line = line.split(" #").next().unwrap();
+    let line = line.split(" #").next().unwrap().replace("640x360", SIZE);
+    let draws = line.starts_with("frazil preview") && !line.contains("--size") && !line.contains("--help");
+    let size = if draws { &["--size", SIZE][..] } else { &[] };
     // A shell would put the output into the file behind `>`.
-    let (line, file) = line.split_once(" > ").map_or((line, None), |(line, file)| (line, Some(file.trim())));
-    let arguments = line.split_whitespace().skip(1);
+    let (line, file) =
+        line.split_once(" > ").map_or((&line[..], None), |(line, file)| (line, Some(file.trim())));
+    let arguments = line.split_whitespace().skip(1).chain(size.iter().copied());
     let output = Command::cargo_bin("frazil").unwrap().current_dir(folder).args(arguments).output().unwrap();
     assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
     if let Some(file) = file {
