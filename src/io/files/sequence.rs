@@ -30,17 +30,18 @@ impl Pattern {
                 after: text[end..].into(),
             })
         };
-        if let Some(start) = text.rfind('%') {
-            let end = start + text[start..].find('d')? + 1;
-            let width = &text[start + 1..end - 1];
-            let digits = if width.is_empty() { 1 } else { width.parse().ok()? };
-            return part(start, end, digits);
+        let digits_at = |start: usize| text[start..].bytes().take_while(u8::is_ascii_digit).count();
+        let width = |digits: &str| if digits.is_empty() { Some(1) } else { digits.parse().ok() };
+        // A % without digits and a d behind it is a part of the name.
+        for (start, _) in text.rmatch_indices('%') {
+            let end = start + 1 + digits_at(start + 1);
+            if text[end..].starts_with('d') {
+                return part(start, end + 1, width(&text[start + 1..end])?);
+            }
         }
         if let Some(start) = text.rfind("$F") {
-            let length = text[start + 2..].bytes().take_while(u8::is_ascii_digit).count();
-            let width = &text[start + 2..start + 2 + length];
-            let digits = if width.is_empty() { 1 } else { width.parse().ok()? };
-            return part(start, start + 2 + length, digits);
+            let end = start + 2 + digits_at(start + 2);
+            return part(start, end, width(&text[start + 2..end])?);
         }
         let end = text.rfind('#')? + 1;
         let start = text[..end].trim_end_matches('#').len();
@@ -86,6 +87,11 @@ mod tests {
             assert_eq!(Pattern::parse(name.as_ref()).unwrap().path(12), PathBuf::from("a/b.0012.obj"));
         }
         assert_eq!(Pattern::parse("b.%d.obj".as_ref()).unwrap().path(-3), PathBuf::from("b.-3.obj"));
+        for (name, file) in
+            [("100%.##.obj", "100%.07.obj"), ("50%_x.$F.obj", "50%_x.7.obj"), ("5%d 9%.obj", "57 9%.obj")]
+        {
+            assert_eq!(Pattern::parse(name.as_ref()).unwrap().path(7), PathBuf::from(file));
+        }
         assert!(Pattern::parse("boot.obj".as_ref()).is_none());
     }
 

@@ -167,14 +167,14 @@ fn type_of(word: &str) -> Option<Type> {
 fn decoded(name: &str) -> String {
     let (bytes, mut out, mut at) = (name.as_bytes(), Vec::new(), 0);
     while at < bytes.len() {
-        let code = bytes.get(at + 1..at + 3).and_then(|two| std::str::from_utf8(two).ok());
-        match code.and_then(|two| u8::from_str_radix(two, 16).ok()).filter(|_| bytes[at] == b'%') {
-            Some(byte) => {
-                out.push(byte);
+        let digit = |index: usize| bytes.get(index).and_then(|byte| (*byte as char).to_digit(16));
+        match (bytes[at], digit(at + 1), digit(at + 2)) {
+            (b'%', Some(high), Some(low)) => {
+                out.push((16 * high + low) as u8);
                 at += 3;
             }
-            None => {
-                out.push(bytes[at]);
+            (byte, ..) => {
+                out.push(byte);
                 at += 1;
             }
         }
@@ -404,4 +404,17 @@ impl<'a> Reader<'a> {
 
 fn truncated() -> String {
     "the .vtk file ends before its numbers do".into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_percent_sign_and_two_digits_are_decoded() {
+        assert_eq!(decoded("point%20data"), "point data");
+        for name in ["50%", "50%2", "%+A", "%zz"] {
+            assert_eq!(decoded(name), name);
+        }
+    }
 }
