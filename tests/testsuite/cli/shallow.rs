@@ -8,7 +8,7 @@ use frazil::io::mesh;
 use serde_json::Value;
 
 use crate::picture::Picture;
-use crate::program::{Folder, fails, frazil, works};
+use crate::program::{CUBE, Folder, fails, frazil, works};
 
 const CLI: &str = include_str!("../../../docs/cli.md");
 
@@ -120,6 +120,16 @@ fn a_check_counts_cells_and_millilitres() {
     assert!(said.contains("0.001 takes millimetres") && said.contains("40000 x 40000 cells"), "{said}");
     let said = works(folder, &format!("{large} --set shallow.scale=0.001"));
     assert!(!said.contains("warning"), "{said}");
+    // A level set has no scale that could be set.
+    fs::write(folder.join("block.obj"), CUBE).unwrap();
+    works(folder, "convert block.obj block.ply --scale 100");
+    works(folder, "vdb from-mesh block.ply --cell 5 -o block.vdb");
+    for file in ["block.ply", "block.vdb"] {
+        let at = "--set pour.1.at=[50,150,50] --set source.1.at=[50,150,50]";
+        let set = format!("--set shallow.terrain={file} --set shallow.cell=1 --set shallow.top=1000 {at}");
+        let said = works(folder, &format!("check spill.toml {set}"));
+        assert_eq!(said.contains("millimetres"), file == "block.ply", "{said}");
+    }
 }
 
 #[test]

@@ -88,8 +88,9 @@ impl Inputs {
         let bounds = terrain.bounds();
         let grid = grid(setup, &bounds).map_err(|error| error.in_file(&scene.path))?;
         let heights = heights(setup, &bounds).map_err(|error| error.in_file(&scene.path))?;
-        let mut warnings: Vec<String> = unit_warning(setup, &path, &bounds).into_iter().collect();
+        let mut warnings = Vec::new();
         if let Terrain::Mesh(mesh) = &terrain {
+            warnings.extend(unit_warning(setup, &path, &bounds));
             warnings.extend(rounding_warning(&path, mesh, grid.cell));
         }
         // A terrain in millimetres by mistake has too many cells.
@@ -313,11 +314,11 @@ fn attachment_warnings(
     setup.points.iter().zip(attached).filter_map(warning).collect()
 }
 
-/// The warning about a terrain that is probably in another unit.
+/// The warning about a mesh that is probably in another unit.
 fn unit_warning(setup: &Shallow, path: &Path, [low, high]: &[DVec3; 2]) -> Option<String> {
     let size = high - low;
-    let is_mesh = setup.image.is_none() && setup.space.scale == Space::OWN.scale;
-    (is_mesh && size.x.max(size.z) > MAX_LIKELY_WIDTH).then(|| {
+    let is_unscaled = setup.space.scale == Space::OWN.scale;
+    (is_unscaled && size.x.max(size.z) > MAX_LIKELY_WIDTH).then(|| {
         format!(
             "{}: the terrain is {:.1} x {:.1} x {:.1} m (x, y, z): shallow.scale = 0.001 takes millimetres, 0.01 centimetres",
             path.display(),
