@@ -1101,7 +1101,7 @@ typedef struct frz_tracker frz_tracker;
  */
 typedef struct {
     /**
-     * Verb of the running phase, for instance "distance"; empty between phases. Zero-terminated.
+     * Name of the running phase, for instance "distance"; empty between phases. Zero-terminated.
      */
     char stage[32];
     /**
@@ -2909,7 +2909,7 @@ typedef struct {
  */
 typedef struct {
     /**
-     * Verb of the phase. Zero-terminated.
+     * Name of the phase. Zero-terminated.
      */
     char stage[32];
     /**

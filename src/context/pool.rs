@@ -119,8 +119,8 @@ fn on_this_thread<R: Send>(work: impl FnOnce() -> R + Send) -> R {
             // The worker returns when its pool is dropped and this job is done.
             drop(owned.lock().unwrap_or_else(PoisonError::into_inner).take());
         });
-        // SAFETY: the job has run and is gone before `run` returns below: the worker ends only when its pool was dropped, which only the
-        // job does, and when no job is left. Until then everything that the job borrows is alive.
+        // SAFETY: `run` returns only once the pool was dropped and no job is left. Only the job drops the pool, at its end: by then it has
+        // run, and everything that it borrows is still alive.
         let job =
             unsafe { std::mem::transmute::<Box<dyn FnOnce() + Send + '_>, Box<dyn FnOnce() + Send>>(job) };
         if let Some(pool) = &*owner.lock().unwrap_or_else(PoisonError::into_inner) {

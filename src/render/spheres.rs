@@ -272,7 +272,9 @@ impl View {
         let offset = centre - self.eye;
         let along = offset.dot(&toward) / length;
         let beside = offset - toward * (along / length);
-        let depth = radius * radius - beside.norm_squared();
-        (depth >= 0.0).then(|| along - depth.sqrt()).filter(|&distance| distance > 0.0)
+        let half_chord_squared = radius * radius - beside.norm_squared();
+        (half_chord_squared >= 0.0)
+            .then(|| along - half_chord_squared.sqrt())
+            .filter(|&distance| distance > 0.0)
     }
 }

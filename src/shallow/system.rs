@@ -30,7 +30,7 @@ pub struct Shallow {
     pub(super) identity: Identity,
     pub(super) pipes: Pipes,
     pub(super) flow: Flow,
-    pub(super) flows: Flows,
+    pub(super) flow_points: Flows,
     pub(super) remap: Remap,
     pub(super) falls: Falling,
     pub(super) thick: ThickenedPipes,
@@ -138,7 +138,7 @@ impl Shallow {
             pipes,
             columns,
             identity: Identity::new(),
-            flows: Flows::default(),
+            flow_points: Flows::default(),
             poured: 0,
             still_level: BOTTOMLESS,
             time: 0.0,
@@ -216,7 +216,7 @@ impl Shallow {
     /// # Errors
     /// As [`Flows::set`].
     pub fn set_flows(&mut self, points: &[FlowPoint], which: impl Fn(usize) -> String) -> Result<()> {
-        self.flows.set(&self.columns, points, which)
+        self.flow_points.set(&self.columns, points, which)
     }
 
     /// Adds a depth (m; negative: removes it) to a column, within 0 and its ceiling; returns the depth added (m).
@@ -265,7 +265,7 @@ impl Shallow {
         self.find_overflow_edges();
         let [emptied, filled, slowed] = self.flow.step(&self.columns, &self.pipes, &step, length, stop);
         self.advance_falling(length);
-        self.flows.step(&self.columns, &mut self.flow, -self.params.gravity[1], self.time, length);
+        self.flow_points.step(&self.columns, &mut self.flow, -self.params.gravity[1], self.time, length);
         self.steps.push(length);
         self.time += length;
         report.steps += 1;
@@ -332,9 +332,9 @@ impl Shallow {
         Units {
             inside: self.flow.units(),
             poured: self.poured,
-            sourced: self.flows.sourced,
-            drained: self.flows.drained,
-            absorbed: self.flows.absorbed,
+            sourced: self.flow_points.sourced,
+            drained: self.flow_points.drained,
+            absorbed: self.flow_points.absorbed,
             lost: self.flow.links.lost,
             gained: self.flow.links.gained,
             held: self.remap.held.units(),

@@ -22,7 +22,7 @@ pub struct frz_context {
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_progress {
-    /// Verb of the running phase, for instance "distance"; empty between phases. Zero-terminated.
+    /// Name of the running phase, for instance "distance"; empty between phases. Zero-terminated.
     pub stage: [c_char; 32],
     /// Phases finished since the context was created or reset.
     pub stages_done: u64,
@@ -40,7 +40,7 @@ const FIRST_PROGRESS_BYTES: usize = std::mem::offset_of!(frz_progress, fraction)
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_stage_time {
-    /// Verb of the phase. Zero-terminated.
+    /// Name of the phase. Zero-terminated.
     pub stage: [c_char; 32],
     /// Seconds; the sum over all of its runs in the call.
     pub seconds: f64,

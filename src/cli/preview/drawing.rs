@@ -107,7 +107,7 @@ impl Look {
                     models.push(if let Some(painted) = painted { model.painted(painted) } else { model });
                 }
                 Part::Obstacle(mesh) => models.push(Model::mesh(&mesh, STEEL)),
-                Part::Cloth(mesh) => models.push(Model::mesh(&mesh, LINEN)),
+                Part::StaticMesh(mesh) => models.push(Model::mesh(&mesh, LINEN)),
                 Part::Points(path, points) => {
                     let cloud = Cloud::new(&points, self.color.as_deref());
                     clouds.push(cloud.map_err(|error| Error::file(path, error.to_string()))?);
@@ -181,7 +181,7 @@ fn cut(ctx: &Context, parts: Vec<Part>, plane: Plane) -> Result<Drawing> {
     for part in parts {
         match part {
             Part::Mesh(detailed) | Part::Liquid(detailed, _) => cut = cut.with_surface(&detailed.mesh, INK),
-            Part::Ground(mesh, ..) | Part::Obstacle(mesh) | Part::Cloth(mesh) => {
+            Part::Ground(mesh, ..) | Part::Obstacle(mesh) | Part::StaticMesh(mesh) => {
                 cut = cut.with_surface(&mesh, INK)
             }
             Part::Points(path, _) => {

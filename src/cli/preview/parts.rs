@@ -15,10 +15,10 @@ pub enum Part {
     Liquid(DetailedMesh, LiquidLook),
     /// The ground below a liquid, with the stains on its vertices, 0 to 1, and the liquid that left them; stains are optional.
     Ground(TriMesh, Vec<f64>, LiquidLook),
-    /// A tool or an obstacle in a liquid.
+    /// A moving solid in a liquid: a tool or an obstacle.
     Obstacle(TriMesh),
-    /// A static mesh in a liquid.
-    Cloth(TriMesh),
+    /// An obstacle from a mesh file, which does not move; drawn as linen.
+    StaticMesh(TriMesh),
     /// Points, and the file that they came from.
     Points(PathBuf, Points),
     /// A level set.
@@ -46,7 +46,7 @@ pub trait Folder: Send {
     /// A scene that cannot be read.
     fn fps(&self) -> Result<f64>;
 
-    /// Reads the contents of a frame; in ascending order, each frame reads one file of each stage.
+    /// Reads the contents of a frame. If frames are read in ascending order, each needs only one file of each stage.
     ///
     /// # Errors
     /// A file that cannot be read or that is not what was written; cancel.
@@ -90,7 +90,7 @@ impl LiquidLook {
     /// The looks of dyes.
     pub const DYES: [Self; 5] = [Self::BLOOD, Self::PAINT, Self::HONEY, Self::MILK, Self::COFFEE];
 
-    /// The liquid of a name in a scene; blood if the name is unknown.
+    /// The look of a scene's `liquid`: water, paint or honey; blood for any other name.
     pub fn of(name: &str) -> Self {
         let known = [Self::WATER, Self::PAINT, Self::HONEY].into_iter().find(|known| known.name == name);
         known.unwrap_or(Self::BLOOD)

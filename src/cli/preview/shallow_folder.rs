@@ -64,7 +64,7 @@ impl ShallowFolder {
                 }
                 let tools = obstacles.split_off(meshes).into_iter().map(Part::Obstacle);
                 let parts = std::iter::once(Part::Ground(terrain, Vec::new(), look));
-                parts.chain(obstacles.into_iter().map(Part::Cloth)).chain(tools).collect()
+                parts.chain(obstacles.into_iter().map(Part::StaticMesh)).chain(tools).collect()
             }
             Err(error) => {
                 log::warn!("{error}: the liquid is drawn without its terrain");

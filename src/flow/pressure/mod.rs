@@ -26,7 +26,7 @@ use stencil::{Task, row_of};
 pub struct Solved {
     /// Iterations of the conjugate gradient method.
     pub iterations: usize,
-    /// Largest remaining divergence, times the cell (m/s).
+    /// Largest remaining divergence, times the edge of a cell (m/s).
     pub divergence: f32,
     /// Largest speed (m/s) on any axis, before.
     pub fastest: f32,
@@ -35,7 +35,7 @@ pub struct Solved {
 /// Maximum number of iterations.
 const MAX_ITERATIONS: usize = 200;
 
-/// Changes the velocity (m/s, at lower faces) so that, in all cells not covered by solids, its divergence times the cell is at most
+/// Changes the velocity (m/s, at lower faces) so that, in all cells not covered by solids, its divergence times a cell's edge is at most
 /// `tolerance` times the largest speed. `pressure` holds the initial guess, then the solution; its values in the rim are fixed.
 ///
 /// # Errors
@@ -46,21 +46,22 @@ pub fn project(
     velocity: &mut [Field; 3],
     pressure: &mut Field,
     multigrid: &mut Multigrid,
-    [residual, guess, direction, product, spare, fine_correction]: [&mut [Tile]; 6],
+    [residual, preconditioned, direction, product, spare, fine_correction]: [&mut [Tile]; 6],
     tolerance: f32,
 ) -> Result<Solved> {
     multigrid.rebuild(tiles, solids);
     let fastest = max(fastest(velocity), solids.fastest());
     let target = tolerance * fastest;
     let pockets = Pockets::find(&multigrid.finest);
-    net_inflow(tiles, solids, velocity, guess);
+    // Until the first iteration the buffer holds the right-hand side.
+    net_inflow(tiles, solids, velocity, preconditioned);
     // Cells inside solids have no equation: divergence that solids cause there must not reach the coarse levels.
-    multigrid.finest.clear_covered(guess);
-    pockets.subtract_means(guess);
+    multigrid.finest.clear_covered(preconditioned);
+    pockets.subtract_means(preconditioned);
     pockets.subtract_means(pressure);
-    multigrid.finest.compute(pressure, |slot| Task::Residual(&guess[slot]), residual);
+    multigrid.finest.compute(pressure, |slot| Task::Residual(&preconditioned[slot]), residual);
     let mut solved = Solved { iterations: 0, divergence: max_abs(residual), fastest };
-    let mut energy = 0.0;
+    let mut curvature = 0.0;
     // The divergence that a step leaves adds to that of the next one: at least one iteration, unless it is negligible.
     let is_due = |solved: &Solved| match solved.iterations {
         0 => solved.divergence > 0.01 * target,
@@ -68,15 +69,18 @@ pub fn project(
     };
     while is_due(&solved) && solved.iterations < MAX_ITERATIONS {
         ctx.check()?;
-        let now = multigrid.cycle(residual, guess, [&mut *spare, &mut *fine_correction]);
+        // Preconditioned conjugate gradients: residual_product is r.z, -overlap is beta, curvature is d.Ld.
+        let residual_product =
+            multigrid.cycle(residual, preconditioned, [&mut *spare, &mut *fine_correction]);
         // The new direction is made conjugate to the old one even though the preconditioner is not symmetric (Notay 2000).
-        let along = if energy > 0.0 { multigrid::product(guess, product) / energy } else { 0.0 };
-        update_direction(direction, guess, -along as f32, solved.iterations == 0);
-        energy = multigrid.finest.compute(direction, |_| Task::Product, product);
-        if !(energy > 0.0 && now > 0.0) {
+        let overlap =
+            if curvature > 0.0 { multigrid::product(preconditioned, product) / curvature } else { 0.0 };
+        update_direction(direction, preconditioned, -overlap as f32, solved.iterations == 0);
+        curvature = multigrid.finest.compute(direction, |_| Task::Product, product);
+        if !(curvature > 0.0 && residual_product > 0.0) {
             break;
         }
-        let step = (now / energy) as f32;
+        let step = (residual_product / curvature) as f32;
         solved.divergence = advance(pressure, residual, direction, product, step);
         solved.iterations += 1;
     }
@@ -85,13 +89,13 @@ pub fn project(
     Ok(solved)
 }
 
-/// direction = guess + share direction; in the first iteration, direction = guess.
-fn update_direction(direction: &mut [Tile], guess: &[Tile], share: f32, is_first: bool) {
-    direction.par_iter_mut().zip(guess).with_min_len(64).for_each(|(direction, guess)| {
+/// direction = preconditioned + share direction; in the first iteration, direction = preconditioned.
+fn update_direction(direction: &mut [Tile], preconditioned: &[Tile], share: f32, is_first: bool) {
+    direction.par_iter_mut().zip(preconditioned).with_min_len(64).for_each(|(direction, preconditioned)| {
         if is_first {
-            *direction = *guess;
+            *direction = *preconditioned;
         } else {
-            direction.iter_mut().zip(guess).for_each(|(to, from)| *to = from + share * *to);
+            direction.iter_mut().zip(preconditioned).for_each(|(to, from)| *to = from + share * *to);
         }
     });
 }
@@ -159,7 +163,7 @@ pub fn fastest_except(velocity: &[Field; 3], share: f64) -> f32 {
     0.0
 }
 
-/// Net inflow of each cell (m/s: minus the divergence times the cell).
+/// Net inflow of each cell (m/s): minus the divergence times a cell's edge.
 pub fn net_inflow(tiles: &Tiles, solids: &Solids, velocity: &[Field; 3], out: &mut [Tile]) {
     out.par_iter_mut().enumerate().with_min_len(16).for_each(|(slot, out)| {
         for (row, out) in out.chunks_exact_mut(8).enumerate() {
@@ -220,7 +224,7 @@ fn subtract_gradient(tiles: &Tiles, solids: &Solids, pressure: &Field, velocity:
             let faces = solids.faces(slot);
             for (row, speed) in speed.chunks_exact_mut(8).enumerate() {
                 // In the rim only the faces of active cells change.
-                let moving = match axis {
+                let changed_lanes = match axis {
                     _ if is_active => 8,
                     0 => 8 * usize::from(row < 8),
                     1 => 8 * usize::from(row & 7 == 0),
@@ -239,7 +243,7 @@ fn subtract_gradient(tiles: &Tiles, solids: &Solids, pressure: &Field, velocity:
                         lower
                     }
                 };
-                for (lane, speed) in speed.iter_mut().enumerate().take(moving) {
+                for (lane, speed) in speed.iter_mut().enumerate().take(changed_lanes) {
                     *speed -= upper[lane] - lower[lane];
                 }
                 if let Some(faces) = faces {

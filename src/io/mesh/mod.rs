@@ -30,7 +30,7 @@ pub fn read(path: &Path) -> Result<TriMesh> {
     read_polygons(path).map(PolygonMesh::into_triangles)
 }
 
-/// Reads a mesh with its polygons: two meshes with the same polygons then get the same triangles.
+/// Reads a mesh with its polygons uncut.
 ///
 /// # Errors
 /// As [`read`].

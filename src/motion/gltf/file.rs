@@ -112,8 +112,9 @@ impl File {
     /// As [`File::rows`]; transforms of different counts.
     pub fn instances(&self, node: usize) -> std::result::Result<Option<Vec<Local>>, String> {
         let Some(found) = self.instances.get(&node) else { return Ok(None) };
-        let accessor =
-            |index: usize| self.document.accessors().nth(index).ok_or("instances name no accessor");
+        let accessor = |index: usize| {
+            self.document.accessors().nth(index).ok_or("instances refer to an accessor that does not exist")
+        };
         let triples = |index: Option<usize>| -> std::result::Result<_, String> {
             index.map(|index| self.rows::<3>(&accessor(index)?)).transpose()
         };

@@ -176,7 +176,7 @@ fn instances(root: &Map<String, Value>) -> Result<HashMap<usize, Instancing>, St
         };
         let accessor = |key: &str| match index(attributes, key) {
             Some(accessor) if accessor >= accessors => {
-                Err(format!("the instances of node {node} name no accessor"))
+                Err(format!("the instances of node {node} refer to an accessor that does not exist"))
             }
             found => Ok(found),
         };
@@ -229,8 +229,8 @@ fn reduce(root: &mut Map<String, Value>) {
     {
         root.remove(key);
     }
-    root.values_mut().for_each(without_additions);
-    without_keys(root);
+    root.values_mut().for_each(remove_additions_at_any_depth);
+    remove_additions(root);
     let animates_node = |channel: &Value| {
         let target = channel.get("target");
         let path = target.and_then(|target| target.get("path")).and_then(Value::as_str);
@@ -269,18 +269,18 @@ fn is_read(attribute: &str) -> bool {
 }
 
 /// Removes extensions and application data, at any depth.
-fn without_additions(value: &mut Value) {
+fn remove_additions_at_any_depth(value: &mut Value) {
     match value {
-        Value::Array(values) => values.iter_mut().for_each(without_additions),
+        Value::Array(values) => values.iter_mut().for_each(remove_additions_at_any_depth),
         Value::Object(object) => {
-            without_keys(object);
-            object.values_mut().for_each(without_additions);
+            remove_additions(object);
+            object.values_mut().for_each(remove_additions_at_any_depth);
         }
         _ => {}
     }
 }
 
-fn without_keys(object: &mut Map<String, Value>) {
+fn remove_additions(object: &mut Map<String, Value>) {
     object.remove("extensions");
     object.remove("extras");
 }
@@ -289,10 +289,14 @@ fn without_keys(object: &mut Map<String, Value>) {
 fn checked(root: Value) -> Result<Document, String> {
     let mut root: gltf::json::Root =
         serde_json::from_value(root).map_err(|error| one_line(&error.to_string()))?;
-    // The check below reads the bounds of positions before it knows that they exist, and requires them; nothing here needs the bounds.
+    // `Document::from_json` reads the bounds of position accessors before it checks that the accessors exist, and requires both;
+    // nothing here needs them.
     for attribute in root.meshes.iter().flat_map(|mesh| &mesh.primitives).flat_map(|p| p.attributes.values())
     {
-        let accessor = root.accessors.get_mut(attribute.value()).ok_or("an attribute names no accessor")?;
+        let accessor = root
+            .accessors
+            .get_mut(attribute.value())
+            .ok_or("an attribute refers to an accessor that does not exist")?;
         accessor.min = Some(vec![0.0; 3].into());
         accessor.max = Some(vec![0.0; 3].into());
     }
@@ -300,21 +304,21 @@ fn checked(root: Value) -> Result<Document, String> {
     for animation in &root.animations {
         let samplers = animation.samplers.len();
         if animation.channels.iter().any(|channel| channel.sampler.value() >= samplers) {
-            return Err("a channel names no sampler".into());
+            return Err("a channel refers to a sampler that does not exist".into());
         }
         if animation.channels.iter().any(|channel| channel.target.node.value() >= nodes) {
-            return Err("a channel names no node".into());
+            return Err("a channel refers to a node that does not exist".into());
         }
         let keys = animation.samplers.iter().flat_map(|sampler| [sampler.input, sampler.output]);
         if keys.into_iter().any(|accessor| accessor.value() >= accessors) {
-            return Err("the sampler of an animation names no accessor".into());
+            return Err("the sampler of an animation refers to an accessor that does not exist".into());
         }
     }
     let targets =
         root.meshes.iter().flat_map(|mesh| &mesh.primitives).flat_map(|p| p.targets.iter().flatten());
     let mut named = targets.flat_map(|target| [target.positions, target.normals, target.tangents]).flatten();
     if named.any(|accessor| accessor.value() >= accessors) {
-        return Err("a morph target names no accessor".into());
+        return Err("a morph target refers to an accessor that does not exist".into());
     }
     Document::from_json(root).map_err(|error| one_line(&error.to_string()))
 }

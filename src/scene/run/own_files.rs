@@ -1,4 +1,4 @@
-//! Which files of an output folder runs have written: all others are never overwritten or removed.
+//! Knows which files of an output folder were written by runs; all others are never overwritten or removed.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -251,7 +251,7 @@ impl OwnFiles {
         Some(FrameFile { stage: stage.to_string(), frame })
     }
 
-    /// All existing files that are named like those of runs, by path relative to the folder; files of frames with stage and frame.
+    /// All existing files that are named like those of runs, by path relative to the folder; with the stage and frame of each that belongs to a frame.
     ///
     /// # Errors
     /// A folder that cannot be read.
@@ -296,7 +296,7 @@ impl OwnFiles {
         Ok(())
     }
 
-    /// The stages of the folder's record and those of which it has records of frames.
+    /// The stages that `files.json` lists, and all others that have records of frames in `state/`.
     ///
     /// # Errors
     /// A folder that cannot be read.

@@ -37,15 +37,15 @@ pub const KEYS: &[Key] = &[
     key(FIRST, "surface", "rebuild", Flag, or("true"))
         .means("true: the mesh is cut and rebuilt where the liquid merges or splits, and closed first; false: it is only flagged there"),
     key(STEP, "surface", "match", Choice(&["flagged", "every"]), or("\"flagged\""))
-        .means("where a mesh that is rebuilt takes the liquid's topology: flagged, where vertices find a change, and at drops; every: all over it in each frame, also at bubbles, which takes longer"),
+        .means("where a mesh that is rebuilt takes the liquid's topology: flagged: only around flagged vertices, and at drops; every: all over it in each frame, also at bubbles, which takes longer"),
     key(STEP, "surface", "min_drop", Whole(0, 1_000_000), or("8"))
-        .means("of a mesh that is rebuilt, parts of fewer particles (inside, or half a spacing outside) are taken away, but not the last part, and drops of fewer get no mesh; 0 and 1: only parts without any go"),
+        .means("minimum number of particles of a part (inside it, or up to half a spacing outside): with `rebuild`, parts with fewer are removed unless the mesh is a single part, and drops with fewer get no mesh; 0 and 1: only parts without any are removed"),
     key(STEP, "surface", "ahead", Whole(0, 100), or("4"))
-        .means("frames before a merge or split from which on a mesh that is rebuilt eases towards it; 0: it is there from one frame to the next"),
+        .means("frames before a merge or split from which on a mesh that is rebuilt eases towards it; 0: no easing, the new shape appears in one frame"),
     key(STEP, "surface", "weighting", Choice(&["affine", "mean"]), or("\"affine\""))
         .means("how particles carry vertices: by affine maps, or by their mean as in the thesis, which lags behind"),
     key(STEP, "surface", "half_life", Number(1.0e-3, 1.0e6, "s"), optional("2.0"))
-        .means("time in which half of the detail fades (s), but where the mesh's array `detail` is 1; left out: it stays"),
+        .means("time in which half of the detail fades (s), except where the mesh's array `detail` is 1; left out: no detail fades with time"),
     key(STEP, "surface", "fade", Number(0.0, 1000.0, ""), or("0.0"))
         .means("how much detail fades where the mesh is stretched or pressed: to exp(-fade) while lengths change by a factor of e"),
     key(OUTPUT, "output", "surface", Choices(&["ply", "usd", "obj"]), or("[\"ply\"]"))

@@ -23,11 +23,12 @@ struct OldLink {
     carried: Carried,
 }
 
-/// Buffers.
+/// The fluxes of links before a change, and those found for the new links.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Carry {
-    /// The former links of some rows; the first of each row, and the end of the last.
+    /// The former links of `rows`.
     old: Vec<OldLink>,
+    /// Index in `old` of the first link of each row, then the end.
     starts: Vec<u32>,
     rows: Range<usize>,
     /// Fluxes and remainders of the new links of these rows.
@@ -101,7 +102,8 @@ impl Carry {
         }
     }
 
-    /// Restores the regular pipes of the band's rows, and those to the south of the row before it, which are still in place.
+    /// Restores the regular pipes of the band's rows, and the southward pipes of the row before it: these still hold their values and
+    /// are only cleared, or looked up again, where one end was rebuilt.
     pub fn regular(&self, change: &Change, pipes: &Pipes, flow: &mut Flow) {
         let Change { columns, band, origins } = change;
         let rows = band.rows.clone();
@@ -110,7 +112,7 @@ impl Carry {
                 let (old, kept) = origins.strip(strip);
                 let south = match columns.south(strip) {
                     NONE => 0,
-                    behind => origins.strip(behind as usize).1,
+                    southern => origins.strip(southern as usize).1,
                 };
                 let is_in = rows.contains(&row);
                 let old = if is_in && old >= band.first { Some(old - band.first) } else { None };
@@ -124,7 +126,7 @@ impl Carry {
         }
     }
 
-    /// Restores the pipes of a strip over a side. `kept` are the bits of those between columns that stayed in their strips; `old` is the
+    /// Restores the pipes of a strip over a side. `kept` has the bits of those whose two columns both stayed in their strips; `old` is the
     /// former strip, if it is in the band.
     #[expect(clippy::too_many_arguments)]
     fn strip(
@@ -201,12 +203,13 @@ impl Change<'_> {
         if range.contains(&strip) {
             return self.band.strips[strip - range.start];
         }
-        let behind = strip >= range.end;
-        let shift = if behind { self.origins.shift() } else { 0 };
+        let is_after = strip >= range.end;
+        let shift = if is_after { self.origins.shift() } else { 0 };
         self.columns.strips()[(strip as u32).wrapping_add(shift) as usize]
     }
 
-    /// The former flux and remainder of the regular pipe of an old index over a side. Pipes after the band stay regular.
+    /// The former flux and remainder of the regular pipe of an old index over a side. Pipes after the
+    /// band stay regular and are never asked for, so `flow` has not shifted at other indices.
     fn regular(&self, flow: &Flow, index: u32, side: Side) -> Carried {
         let axis = usize::from(side == Side::South);
         let (strip, range) = (index as usize / STRIP, self.band.range());

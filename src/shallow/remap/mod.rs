@@ -3,6 +3,11 @@
 //! In each cell that changes, columns before and after are matched. Liquid that has no room where it was is pushed up, to other columns of
 //! the cell, to those beside it, or waits until there is room again (`held.rs`): the total never changes. Only the rows with such cells and
 //! those beside them are touched; if the count of columns changes, the data of later rows is shifted.
+//!
+//! | word | meaning |
+//! |---|---|
+//! | band | the rows that a change rebuilds, as they were before it |
+//! | origins | which former column each column was |
 
 mod band;
 mod buffers;
@@ -61,8 +66,9 @@ impl Shallow {
         self.update_cells([0..nx, 0..nz], |cell| solids.cell(cell))
     }
 
-    /// Changes the terrain in a box of cells: ranges of x and of z. `solids` gives the solids of its cells, row by row along x, as
-    /// [`Caster::at`](super::terrain::triangles::Caster::at) does: for each cell from the lowest up, disjoint. It is called more than once.
+    /// Changes the terrain in a box of cells: ranges of x and of z. `solids(n)` gives the solids of the n-th cell of the box,
+    /// counted along x, then z, as [`Caster::at`](super::terrain::triangles::Caster::at) does: disjoint, from the lowest up. It is called
+    /// more than once.
     ///
     /// Nothing is allocated while there are no more columns and links than ever before, and no larger box.
     ///
@@ -82,9 +88,8 @@ impl Shallow {
 
     /// Replaces the solid shapes that move over the terrain.
     ///
-    /// Only the cells of shapes that differ from the previous shape of the same index are rebuilt, and no line is intersected with
-    /// triangles again. As for
-    /// [`Shallow::update_cells`], nothing is allocated, provided there are no more shapes than before.
+    /// Only the cells of shapes that differ from the previous shape of the same index are rebuilt, and no rays are cast at the
+    /// terrain again. As for [`Shallow::update_cells`], nothing is allocated, provided there are no more shapes than before.
     ///
     /// # Errors
     /// As [`Shape::validate`].
@@ -134,7 +139,7 @@ impl Shallow {
         let has_same_links = self.rebuild_pipes(around.clone());
         self.identity = Identity::new();
         self.flow.refit(&self.columns, &self.pipes, rows, has_same_links);
-        self.flows.find_again(&self.columns);
+        self.flow_points.find_again(&self.columns);
         let fallen = self.land_buried() + self.settle_held();
         Moved {
             cells: self.remap.dirty.count(),

@@ -50,7 +50,7 @@ impl Counts {
             runs: count,
             strips,
             rows: flow.bands.row_depths().len(),
-            points: shallow.flows.progress().len(),
+            points: shallow.flow_points.progress().len(),
             links: flow.links.flux.len(),
             heads: heads(shallow).count(),
             parcels: shallow.remap.held.parcels().len(),

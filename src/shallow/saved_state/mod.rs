@@ -123,7 +123,7 @@ impl Shallow {
         self.remap.held.parcels().iter().for_each(|parcel| to.bytes(&parcel.to_bytes()));
         self.falls.packets.iter().for_each(|packet| to.bytes(&packet.to_bytes()));
         self.falls.waiting.iter().for_each(|waiting| to.bytes(&waiting.to_bytes()));
-        for (kind, pending, moved) in self.flows.progress() {
+        for (kind, pending, moved) in self.flow_points.progress() {
             to.numbers(&[code_of_kind(kind), 0], u32::to_le_bytes);
             to.bytes(&pending.to_le_bytes());
             to.bytes(&moved.to_le_bytes());
@@ -145,14 +145,21 @@ impl Shallow {
     }
 
     fn header(&self, counts: &Counts) -> Header {
-        let (flows, links) = (&self.flows, &self.flow.links);
+        let (flow_points, links) = (&self.flow_points, &self.flow.links);
         Header {
             border: code_of_border(self.params.border),
             terrain: self.identity.hash(&self.columns),
             counts: *counts,
             times: [self.time, self.flow.last],
             still: self.still_level,
-            sums: [self.poured, flows.sourced, flows.drained, flows.absorbed, links.lost, links.gained],
+            sums: [
+                self.poured,
+                flow_points.sourced,
+                flow_points.drained,
+                flow_points.absorbed,
+                links.lost,
+                links.gained,
+            ],
             since: self.falls.since,
             tick: self.falls.tick,
         }
@@ -216,7 +223,7 @@ impl<'a> Saved<'a> {
         {
             return Err(refused("belongs to a liquid with other falls"));
         }
-        let own = shallow.flows.progress();
+        let own = shallow.flow_points.progress();
         if own.len() != self.points.len() {
             let (saved, own) = (self.points.len(), own.len());
             return Err(refused(&format!(
@@ -313,7 +320,7 @@ impl<'a> Saved<'a> {
 
     /// Applies the state.
     fn apply(&self, shallow: &mut Shallow) {
-        let Shallow { flow, flows, columns, remap, falls, .. } = &mut *shallow;
+        let Shallow { flow, flow_points, columns, remap, falls, .. } = &mut *shallow;
         remap.held.set(self.parcels().enumerate().map(|(at, parcel)| self.scalars.with_amounts(at, parcel)));
         let packets = self.packets().enumerate().map(|(at, packet)| self.scalars.in_packet(at, packet));
         falls.set(packets, self.waiting().enumerate().map(|(at, waiting)| self.scalars.at_link(at, waiting)));
@@ -344,9 +351,13 @@ impl<'a> Saved<'a> {
         *stored.last = self.header.times[1];
         flow.wake(columns, self.runs());
         for (at, point) in self.points.iter().enumerate() {
-            flows.set_progress(at, f64::from_le_bytes(part(point, 8)), i64::from_le_bytes(part(point, 16)));
+            flow_points.set_progress(
+                at,
+                f64::from_le_bytes(part(point, 8)),
+                i64::from_le_bytes(part(point, 16)),
+            );
         }
-        (flows.sourced, flows.drained, flows.absorbed) = (sourced, drained, absorbed);
+        (flow_points.sourced, flow_points.drained, flow_points.absorbed) = (sourced, drained, absorbed);
         (shallow.poured, shallow.time, shallow.still_level) =
             (poured, self.header.times[0], self.header.still);
         shallow.steps.clear();

@@ -68,7 +68,7 @@ impl Shallow {
             }
         }
         self.flow.set_scalars(&self.columns, Amounts::new(scalars.to_vec(), self.columns.len() + STRIP));
-        self.flows.clear_levels();
+        self.flow_points.clear_levels();
         self.remap.held.forget_amounts();
         self.falls.forget_amounts();
         Ok(())
@@ -95,7 +95,7 @@ impl Shallow {
     /// `Argument`: no such point; a count other than that of the scalars; a concentration beyond its range.
     pub fn set_sourced(&mut self, point: usize, concentrations: &[f64]) -> Result<()> {
         let levels = self.levels(concentrations)?;
-        self.flows.set_levels(point, levels)
+        self.flow_points.set_levels(point, levels)
     }
 
     fn levels(&self, concentrations: &[f64]) -> Result<Levels> {

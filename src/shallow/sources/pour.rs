@@ -21,13 +21,13 @@ impl Shallow {
     /// What a flow point has moved since it was set (m3), in or out.
     pub fn moved(&self, point: usize) -> f64 {
         let cell = self.columns.grid.cell;
-        self.flows.moved(point) as f64 * (cell * cell * self.columns.heights.unit)
+        self.flow_points.moved(point) as f64 * (cell * cell * self.columns.heights.unit)
     }
 
     /// Moves a flow point with the terrain that it lies on; what it has moved, and what is pending, stays. Where it finds no column it
     /// rests until it does.
     pub fn move_flow(&mut self, point: usize, at: [f64; 3]) {
-        self.flows.move_to(&self.columns, point, at);
+        self.flow_points.move_to(&self.columns, point, at);
     }
 
     /// As [`Shallow::set_flows`], after the terrain has moved since the points were first set: one that finds no column rests until it
@@ -36,12 +36,12 @@ impl Shallow {
     /// # Errors
     /// `Argument`: a number out of range.
     pub fn set_flows_resting(&mut self, points: &[FlowPoint], which: impl Fn(usize) -> String) -> Result<()> {
-        self.flows.set_resting(&self.columns, points, which)
+        self.flow_points.set_resting(&self.columns, points, which)
     }
 
     /// Whether a flow point rests, as it lies inside solid or outside of the domain.
     pub fn is_resting(&self, point: usize) -> bool {
-        self.flows.is_resting(point)
+        self.flow_points.is_resting(point)
     }
 
     /// Gives a flow point another rate (m3/s), as a valve does. What it has moved, and what an absorber holds, stays.
@@ -49,6 +49,6 @@ impl Shallow {
     /// # Errors
     /// As [`Flows::set_rate`](super::Flows::set_rate).
     pub fn set_rate(&mut self, point: usize, rate: f64) -> Result<()> {
-        self.flows.set_rate(point, rate)
+        self.flow_points.set_rate(point, rate)
     }
 }

@@ -195,7 +195,7 @@ impl Stains {
                 }
             }
         }
-        liquid.flows.absorbed += absorbed;
+        liquid.flow_points.absorbed += absorbed;
         Ok(absorbed as f64 * self.unit)
     }
 

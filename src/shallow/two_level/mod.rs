@@ -266,15 +266,15 @@ impl Detail {
             let is_near = self.is_near(position);
             let [own, other] =
                 if is_near { [&mut self.fine, &mut self.coarse] } else { [&mut self.coarse, &mut self.fine] };
-            own.flows.move_to(&own.columns, at, position);
-            let (pending, moved) = other.flows.deactivate(at);
-            let (own_pending, own_moved) = own.flows.pending_and_moved(at);
+            own.flow_points.move_to(&own.columns, at, position);
+            let (pending, moved) = other.flow_points.deactivate(at);
+            let (own_pending, own_moved) = own.flow_points.pending_and_moved(at);
             // In units of the liquid that it acts on now.
             let (pending, moved) = match is_near {
                 true => (pending * FINE_PER_COARSE as f64, moved * FINE_PER_COARSE),
                 false => (pending / FINE_PER_COARSE as f64, moved / FINE_PER_COARSE),
             };
-            own.flows.set_progress(at, own_pending + pending, own_moved + moved);
+            own.flow_points.set_progress(at, own_pending + pending, own_moved + moved);
         }
     }
 

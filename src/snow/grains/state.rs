@@ -75,15 +75,15 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
         return Err(wrong(format!("has grains of {diameter} m, not {}", grains.heap.diameter)));
     }
     let mut heap = Heap::new(diameter);
-    for tie in &mut grains.wake_settings {
-        *tie = from.f64()?;
+    for setting in &mut grains.wake_settings {
+        *setting = from.f64()?;
     }
     for _ in 0..from.count(48)? {
         let mut corner = || Ok(DVec3::new(from.f64()?, from.f64()?, from.f64()?));
         grains.boxes.push([corner()?, corner()?]);
     }
     grains.next_id = from.u32()?;
-    let count = from.count(ROW)?;
+    let count = from.count(GRAIN_BYTES)?;
     require(
         count <= MAX_GRAINS && grains.next_id as usize <= MAX_GRAINS,
         "has more grains than there may be",
@@ -103,7 +103,10 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
             return Err(wrong("has a grain that lies in no block"));
         }
         heap.rows.push(Row { position, mass_state, velocity, still, reference, ..Row::default() });
-        let birth = grains.births.get_mut(id as usize).ok_or_else(|| wrong("has a grain without birth"))?;
+        let birth = grains
+            .births
+            .get_mut(id as usize)
+            .ok_or_else(|| wrong("has a grain whose id was never given out"))?;
         (birth.rest, [birth.frame]) = (from.f32s()?, from.i32s()?);
     }
     for _ in 0..from.count(20)? {
@@ -141,5 +144,5 @@ fn wrong(what: impl Into<String>) -> Error {
     Error::Bytes(what.into())
 }
 
-/// Size of a grain (bytes).
-const ROW: usize = 4 + 12 + 3 * 12 + 8 + 16;
+/// Bytes of a grain in the state.
+const GRAIN_BYTES: usize = 4 + 12 + 3 * 12 + 8 + 16;

@@ -159,7 +159,7 @@ impl Cells {
         });
     }
 
-    /// Calls `see` with the coordinates (half edges) of each octant of the cells from `low` to `high` that hold particles, and with its
+    /// Calls `see` with the coordinates (in halves of a cell's edge) of each octant of the cells from `low` to `high` that hold particles, and with its
     /// count of particles.
     pub fn counts(&self, low: Coord, high: Coord, mut see: impl FnMut([i32; 3], u16)) {
         self.between(low, high, |cell, at| {

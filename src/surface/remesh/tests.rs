@@ -63,9 +63,9 @@ impl Body {
         assert_eq!(self.sources.len(), self.triangles.len());
         let topology = Topology::of(vertices, &self.triangles);
         assert!(topology.is_watertight(), "{topology:?}");
-        let mut is_named = vec![false; vertices];
-        self.triangles.as_flattened().iter().for_each(|&corner| is_named[corner as usize] = true);
-        assert!(!is_named.contains(&false));
+        let mut is_used = vec![false; vertices];
+        self.triangles.as_flattened().iter().for_each(|&corner| is_used[corner as usize] = true);
+        assert!(!is_used.contains(&false));
     }
 
     fn stretched(mut self, by: [f64; 3]) -> Self {
@@ -221,8 +221,8 @@ fn triangles_at_flagged_vertices_are_left_alone() {
         body.flags[vertex] = body.positions[vertex].y > 0.5;
     }
     let flagged = |body: &Body| {
-        let is_it = |names: &[u32; 3]| names.iter().any(|&name| body.flags[name as usize]);
-        let all = body.triangles.iter().zip(&body.sources).filter(|(names, _)| is_it(names));
+        let is_flagged = |corners: &[u32; 3]| corners.iter().any(|&corner| body.flags[corner as usize]);
+        let all = body.triangles.iter().zip(&body.sources).filter(|(corners, _)| is_flagged(corners));
         all.map(|(_, source)| *source).collect::<Vec<_>>()
     };
     let before = flagged(&body);

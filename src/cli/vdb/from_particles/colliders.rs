@@ -103,7 +103,7 @@ impl Solid {
         }
         if !surface.is_closed() {
             let (path, name) = (path.display(), grid.name());
-            log::warn!("{path}: grid \"{name}\" is cut off: its holes are closed by cones");
+            log::warn!("{path}: grid \"{name}\" ends inside of the surface: the holes are closed by cones");
         }
         Ok(Self::Surface(surface, None))
     }

@@ -28,6 +28,8 @@ pub(in crate::scene::shallow) fn of_shot(kind: &'static str) -> Volume {
 
 /// The bytes of a frame's .vdb file.
 ///
+/// `made_from` is the hash of everything that the frame was made from.
+///
 /// # Errors
 /// Out of memory; cancel.
 pub(in crate::scene::shallow) fn bytes(

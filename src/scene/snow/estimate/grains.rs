@@ -98,8 +98,8 @@ impl Forecast {
 
     fn too_many(&self, scene: &Scene) -> String {
         format!(
-            "{}: the base up to frame {} makes {}, more than grains.max = {}: larger grains (grains.radius) or more \
-             grains.compression make fewer",
+            "{}: the base up to frame {} makes {}, more than grains.max = {}: a larger grains.radius or \
+             grains.compression makes fewer",
             scene.path.display(),
             self.to_frame,
             self.count(),

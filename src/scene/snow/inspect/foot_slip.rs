@@ -14,7 +14,7 @@ const MIN_SHARE: f64 = 0.25;
 /// The motion that a character's clip requires of its keys, and how much its feet slip with the keys of the scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FootSlip {
-    /// Velocity (m/s) of the keys at which standing feet stay in position, before any rotation by the keys.
+    /// Velocity (m/s) at which keys must move the character so that standing feet stay in position, before any rotation by the keys.
     pub carry_m_per_s: [f64; 3],
     /// Distance covered in one cycle of the clip (m).
     pub stride_m: f64,
@@ -51,15 +51,15 @@ pub(in crate::scene::snow) fn foot_slip(
     let start = scene.shot.time(frames.first);
     let end = (start + cycle).min(scene.shot.time(frames.last));
     let Some(moved_gait) = gait(moved, start, end)? else { return Ok(None) };
-    let (speed, slips) = (clip_gait.velocity.norm(), moved_gait.velocity.norm());
+    let (speed, slip_speed) = (clip_gait.velocity.norm(), moved_gait.velocity.norm());
     Ok(Some(FootSlip {
         carry_m_per_s: clip_gait.carry().into(),
         stride_m: speed * cycle,
         round_s: cycle,
         standing: clip_gait.standing,
-        slips_m_per_s: slips,
+        slips_m_per_s: slip_speed,
         keys: keys(scene, object, clip_gait.carry())?,
-        slips: slips > MIN_SLIP && slips > MIN_SHARE * speed,
+        slips: slip_speed > MIN_SLIP && slip_speed > MIN_SHARE * speed,
     }))
 }
 

@@ -32,9 +32,10 @@ impl Index for u32 {
     }
 }
 
-/// The triangles of 16 quartets side by side. Their vertices are a + position in the north and c + position in the south. An index is
-/// a + `add` in the north; in the south, where `south` has all bits set, it is c + `add`. Where `turned` has the bit of a quartet that is
-/// divided from north-east to south-west, north and south are swapped.
+/// The triangles of 16 quartets side by side. Their vertices are a + position in the north and c + position in the south. Index n is
+/// a + `add[n]` at a corner in the north, where `south[n]` is 0, and c + `add[n]` in the south, where all bits of `south[n]` are set.
+/// `turned[n]` is the bit of the quartet if the corner changes between north and south when the quartet is divided from north-east to
+/// south-west; else 0.
 struct Pattern {
     add: [u32; PAIR * STRIP],
     south: [u32; PAIR * STRIP],

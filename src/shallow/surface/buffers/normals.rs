@@ -38,9 +38,10 @@ impl Shown<'_> {
         };
         let own = self.heights[index];
         let slope = |before: Option<usize>, after: Option<usize>| {
-            let cells = if before.is_some() && after.is_some() { 1.0 } else { 2.0 };
+            // A one-sided difference spans one cell, not two.
+            let scale = if before.is_some() && after.is_some() { 1.0 } else { 2.0 };
             let height = |side: Option<usize>| side.map_or(own, |side| self.heights[side]);
-            height(before).wrapping_sub(height(after)) as f32 * self.slope * cells
+            height(before).wrapping_sub(height(after)) as f32 * self.slope * scale
         };
         upright(slope(west, east), slope(north, south))
     }
@@ -53,7 +54,7 @@ pub(in crate::shallow) fn upright(x: f32, z: f32) -> [f32; 3] {
     [x * y, y, z * y]
 }
 
-/// Normals of wet columns, each computed once although the means of several vertices include it.
+/// Normals of wet columns, each computed once, even if the normals of several dry or extra vertices are averaged from it.
 #[derive(Debug, Default)]
 pub(in crate::shallow::surface) struct Normals {
     /// By index.
@@ -63,7 +64,7 @@ pub(in crate::shallow::surface) struct Normals {
 }
 
 impl Normals {
-    /// Reserves memory for columns.
+    /// Resizes to the count of columns; known normals stay if it is the same.
     pub fn reset(&mut self, columns: &Columns) {
         if self.normals.len() != columns.len() {
             self.normals.resize(columns.len(), [0.0; 3]);

@@ -22,21 +22,21 @@ impl Ground {
     /// The ground formed by a mesh (m).
     pub fn new(mesh: &TriMesh) -> Self {
         let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
-        let sides = Sides::of(&mesh.triangles, &positions);
+        let sides = HalfEdges::of(&mesh.triangles, &positions);
         let mut triangles = sides.reoriented(&mesh.triangles, &positions);
         if sides.is_closed() && six_volumes(&triangles, &positions) < 0.0
             || !sides.is_closed() && area_up(&triangles, &positions) < 0.0
         {
             triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }
-        let rims = |triangles: &[[u32; 3]]| Sides::of(triangles, &positions).rims(triangles.len());
+        let rims = |triangles: &[[u32; 3]]| HalfEdges::of(triangles, &positions).rims(triangles.len());
         Self { shell: Shell::ground(FRICTION, triangles, rims, positions.clone()) }
     }
 
     /// Whether a mesh bounds a solid, so that it can be ground: each of its edges lies between two faces.
     pub fn is_solid(mesh: &TriMesh) -> bool {
         let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
-        !mesh.triangles.is_empty() && Sides::of(&mesh.triangles, &positions).is_closed()
+        !mesh.triangles.is_empty() && HalfEdges::of(&mesh.triangles, &positions).is_closed()
     }
 
     /// Whether a position (m) is behind it, at most `within` (m) deep.
@@ -45,26 +45,26 @@ impl Ground {
     }
 }
 
-/// The sides of a mesh's triangles, sorted by edge; coincident corners count as one.
-struct Sides {
-    sides: Vec<Side>,
+/// The half-edges of a mesh, sorted by edge; coincident corners count as one.
+struct HalfEdges {
+    sides: Vec<HalfEdge>,
     /// The corner that each corner coincides with.
     same: Vec<u32>,
 }
 
-/// A side of a triangle.
+/// A half-edge: a side of one triangle.
 #[derive(Clone, Copy)]
-struct Side {
-    /// Its ends, the lower one first.
+struct HalfEdge {
+    /// Its ends, the smaller index first.
     edge: [u32; 2],
     triangle: u32,
     /// The corner opposite to it.
     corner: u8,
-    /// Whether it runs from the lower end to the other.
-    runs_up: bool,
+    /// Whether it runs from the smaller index to the larger.
+    ascends: bool,
 }
 
-impl Sides {
+impl HalfEdges {
     fn of(triangles: &[[u32; 3]], positions: &[DVec3]) -> Self {
         let same = Weld::of(positions, triangles).firsts;
         let side = |(index, triangle): (usize, &[u32; 3])| {
@@ -72,18 +72,18 @@ impl Sides {
             [0, 1, 2].map(|corner: usize| {
                 let [a, b] = [ends[(corner + 1) % 3], ends[(corner + 2) % 3]];
                 let edge = [a.min(b), a.max(b)];
-                Side { edge, triangle: index as u32, corner: corner as u8, runs_up: a < b }
+                HalfEdge { edge, triangle: index as u32, corner: corner as u8, ascends: a < b }
             })
         };
-        let has_area = |sides: &[Side; 3]| sides.iter().all(|side| side.edge[0] != side.edge[1]);
-        let mut sides: Vec<Side> =
+        let has_area = |sides: &[HalfEdge; 3]| sides.iter().all(|side| side.edge[0] != side.edge[1]);
+        let mut sides: Vec<HalfEdge> =
             triangles.iter().enumerate().map(side).filter(has_area).flatten().collect();
         sides.par_sort_unstable_by_key(|side| (side.edge, side.triangle, side.corner));
         Self { sides, same }
     }
 
     /// The sides along each edge.
-    fn edges(&self) -> impl Iterator<Item = &[Side]> {
+    fn edges(&self) -> impl Iterator<Item = &[HalfEdge]> {
         self.sides.chunk_by(|a, b| a.edge == b.edge)
     }
 
@@ -94,7 +94,7 @@ impl Sides {
     /// The triangles, flipped so that neighbours agree, with the original orientation of most of each component's area.
     fn reoriented(&self, triangles: &[[u32; 3]], positions: &[DVec3]) -> Vec<[u32; 3]> {
         let pairs = self.edges().filter_map(|sides| match sides {
-            [a, b] => Some((a.triangle, b.triangle, a.runs_up == b.runs_up)),
+            [a, b] => Some((a.triangle, b.triangle, a.ascends == b.ascends)),
             _ => None,
         });
         let mut links: Vec<(u32, u32, bool)> =
@@ -152,7 +152,7 @@ impl Sides {
         for side in &self.sides {
             // The two corners that are not opposite.
             let [low, high] = side.edge;
-            let [first, second] = if side.runs_up { [low, high] } else { [high, low] };
+            let [first, second] = if side.ascends { [low, high] } else { [high, low] };
             for (end, corner) in [(first, (side.corner + 1) % 3), (second, (side.corner + 2) % 3)] {
                 if ends[end as usize] {
                     rims[side.triangle as usize] |= 1 << (RIM_CORNER + corner);
@@ -174,7 +174,7 @@ fn six_volumes(triangles: &[[u32; 3]], positions: &[DVec3]) -> f64 {
     triangles.iter().map(six).sum()
 }
 
-/// Twice the area (m2) that faces up, minus the area that faces down, seen from above.
+/// Twice the difference (m2), seen from above, between the area that faces up and the area that faces down.
 fn area_up(triangles: &[[u32; 3]], positions: &[DVec3]) -> f64 {
     let up = |triangle: &[u32; 3]| {
         let [a, b, c] = triangle.map(|vertex| positions[vertex as usize]);
