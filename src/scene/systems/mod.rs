@@ -44,17 +44,14 @@ mod tests {
         let scene = read(TEXT, keys).unwrap();
         assert_eq!(scene.values.number("snow.glitter"), Some(0.5));
         let resolved = scene.to_toml();
-        let line = "glitter = 0.5                    # how far it can be input_hashes\n";
+        let line = "glitter = 0.5                    # how far it can be seen\n";
         assert!(resolved.contains(line), "{resolved}");
         assert_eq!(read(&resolved, keys).unwrap().to_toml(), resolved);
         assert!(
             template_of([System::Snow.title(), System::Snow.name()], keys)
-                .contains("\n# glitter = 0.5                  # how far it can be input_hashes\n")
+                .contains("\n# glitter = 0.5                  # how far it can be seen\n")
         );
-        assert!(
-            reference_of(keys)
-                .contains("| `glitter` | 0 to 2 m | `0.5` | how far it can be input_hashes |\n")
-        );
+        assert!(reference_of(keys).contains("| `glitter` | 0 to 2 m | `0.5` | how far it can be seen |\n"));
         // `frazil check` prints these.
         assert_eq!(scene.values.by_path()["snow.glitter"], Value::Number(0.5));
         let settings = |stage| settings_of(&scene, stage, &InputHashes::default(), &[]).unwrap();
