@@ -125,7 +125,7 @@ fn a_check_counts_cells_and_millilitres() {
     works(folder, "convert block.obj block.ply --scale 100");
     works(folder, "vdb from-mesh block.ply --cell 5 -o block.vdb");
     for file in ["block.ply", "block.vdb"] {
-        let at = "--set pour.1.at=[50,150,50] --set source.1.at=[50,150,50]";
+        let at = "--set pour.1.at=[0,60,0] --set source.1.at=[0,60,0]";
         let set = format!("--set shallow.terrain={file} --set shallow.cell=1 --set shallow.top=1000 {at}");
         let said = works(folder, &format!("check spill.toml {set}"));
         assert_eq!(said.contains("millimetres"), file == "block.ply", "{said}");

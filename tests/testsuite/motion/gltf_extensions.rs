@@ -91,7 +91,7 @@ fn instances_that_cannot_be_are_a_sentence() {
     }));
     assert!(said.contains("different counts"), "{said}");
     let said = refused(instanced(|_| json!({ "TRANSLATION": 77 })));
-    assert!(said.contains("no accessor"), "{said}");
+    assert!(said.contains("an accessor that does not exist"), "{said}");
     // Many copies of a large mesh, out of a small file.
     let mut maker = Maker::new();
     let corners = 3 * 20_000;
