@@ -7,7 +7,7 @@
 //!
 //! | to | use |
 //! |---|---|
-//! | run a shot from a scene file into a folder, as `frazil snow` does | [`scene::Scene`], [`scene::snow::plan`], [`scene::run::Run`] |
+//! | run a shot from a scene file into a folder, as `frazil snow` does | [`scene::Scene`], [`scene::snow::pipeline`], [`scene::run::Run`] |
 //! | press moving meshes into snow in a frame loop of your own | [`snow::base_layer::BaseLayer`] |
 //! | turn the volume that moving meshes sweep into a level set | [`sweep::chain()`] |
 //! | let mist, or a gas or liquid of your own, flow around obstacles | [`snow::mist`], [`flow`] |
@@ -76,9 +76,9 @@
 //! "#;
 //! let scene = Scene::parse(text, &folder.join("shot.toml"), &[])?;
 //! let inputs = Inputs::load(&scene)?;
-//! let plan = snow::plan(&scene, &inputs);
+//! let pipeline = snow::pipeline(&scene, &inputs);
 //! let ctx = Context::new(Pool::all_cores()?);
-//! let run = Run::prepare(&ctx, &plan, &folder.join("cache"), &[], &scene.shot().frames.into(), None)?;
+//! let run = Run::prepare(&ctx, &pipeline, &folder.join("cache"), &[], &scene.shot().frames.into(), None)?;
 //! run.make(&ctx, |stage, frame, report| log::info!("{stage} {frame}: {:?}", report.results))?;
 //! assert!(folder.join("cache/base/base.0003.vdb").exists());
 //! # Ok(())
