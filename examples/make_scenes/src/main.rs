@@ -130,7 +130,7 @@ fn hero() -> String {
         "noise = { amplitude = 0.012, size = 0.07 }\n\n[grains]\npreset = \"packed\"\ncompression = 0.4\n",
     );
     text.push_str(
-        "\n[mist]\ncell = 0.03\nfrom_speed = 1.2\nhalf_life = 0.5\nturbulence = 3.0\nturbulence_size = 0.4\n",
+        "\n[mist]\ncell = 0.02\nfrom_speed = 1.2\nhalf_life = 0.5\nturbulence = 3.0\nturbulence_size = 0.4\n",
     );
     text.push_str("\n[output]\nobjects = [\"ply\", \"usd\"]\n");
     let last = 1.1 * 71.0 / 24.0;
