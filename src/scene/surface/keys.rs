@@ -37,7 +37,7 @@ pub const KEYS: &[Key] = &[
     key(FIRST, "surface", "rebuild", Flag, or("true"))
         .means("true: the mesh is cut and rebuilt where the liquid merges or splits, and closed first; false: it is only flagged there"),
     key(STEP, "surface", "match", Choice(&["flagged", "every"]), or("\"flagged\""))
-        .means("where a mesh that is rebuilt takes the liquid's topology: flagged: only around flagged vertices, and at drops; every: all over it in each frame, also at bubbles, which takes longer"),
+        .means("where a mesh that is rebuilt takes the liquid's topology; flagged: only around flagged vertices, and at drops; every: all over it in each frame, also at bubbles, which takes longer"),
     key(STEP, "surface", "min_drop", Whole(0, 1_000_000), or("8"))
         .means("minimum number of particles of a part (inside it, or up to half a spacing outside): with `rebuild`, parts with fewer are removed unless the mesh is a single part, and drops with fewer get no mesh; 0 and 1: only parts without any are removed"),
     key(STEP, "surface", "ahead", Whole(0, 100), or("4"))
