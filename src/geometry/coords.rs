@@ -28,7 +28,7 @@ pub fn around(cell: Coord) -> [Coord; 27] {
     std::array::from_fn(|n| plus(cell, [n / 9, n / 3 % 3, n % 3].map(|at| at as i32 - 1)))
 }
 
-/// The eight nodes of a cell: bits x, y and z of their index.
+/// The eight nodes of a cell; the three bits of a node's index, the highest first, are its offsets along x, y and z.
 pub fn nodes_of(cell: Coord) -> [Coord; 8] {
     std::array::from_fn(|n| plus(cell, [n >> 2, n >> 1 & 1, n & 1].map(|at| at as i32)))
 }

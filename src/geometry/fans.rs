@@ -25,7 +25,7 @@ pub struct Fans {
 }
 
 impl Fans {
-    /// The triangles around the wanted vertices; those around others must not change. Takes two passes over all triangles.
+    /// The triangles around the wanted vertices; those around other vertices must not change. Takes two passes over all triangles.
     pub fn of(vertices: usize, triangles: &[[u32; 3]], is_wanted: impl Fn(u32) -> bool) -> Self {
         let of_triangle = |(corners, triangle): (&[u32; 3], u32)| corners.map(|corner| (corner, triangle));
         let uses = triangles.iter().zip(0..).flat_map(of_triangle);
@@ -58,8 +58,8 @@ impl Fans {
         self.around(a).iter().any(|&triangle| triangles[triangle as usize].contains(&b))
     }
 
-    /// Whether two neighbours may be merged: their only common neighbours are the two corners opposite their edge, and these, which lose a
-    /// triangle each, keep three. That also preserves tetrahedra.
+    /// Whether two neighbours may be merged: their only common neighbours are the two corners opposite their edge, and each of these, which
+    /// lose a triangle, keeps at least three. That also preserves tetrahedra.
     pub fn may_join(&self, triangles: &[[u32; 3]], a: u32, b: u32) -> bool {
         let [mut shared, other] = [a, b].map(|vertex| self.ring(triangles, vertex));
         shared.retain(|vertex| other.binary_search(vertex).is_ok());
@@ -91,7 +91,7 @@ impl Fans {
         }
     }
 
-    /// After a flip of the edge of triangles a b c and b a d: see [`flipped`].
+    /// Updates the lists after a flip of the common edge of triangles `one` (a b c) and `two` (b a d): see [`flipped`].
     pub fn flip(&mut self, [one, two]: [u32; 2], [a, b, c, d]: [u32; 4]) {
         self.remove(a, two);
         self.remove(b, one);

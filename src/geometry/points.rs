@@ -4,7 +4,7 @@ use super::DVec3;
 use crate::error::{Error, Result, fail_if};
 
 /// A point cloud. Positions are split into a voxel and an offset within it, as VDB Points stores them: they keep the same
-/// resolution however far they lie from the origin, and pass through a file bit by bit.
+/// resolution however far they lie from the origin, and pass through a file bit for bit.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Points {
     /// Edge of a voxel (m), above 0.

@@ -44,7 +44,7 @@ impl Faces {
 
 /// The vertices that triangles use: only these are posed.
 pub(super) struct Used {
-    /// Their number.
+    /// Number of these vertices.
     pub count: usize,
     /// These vertices, and the triangles over them; `None` if triangles use all.
     own: Option<(Vec<u32>, Vec<[u32; 3]>)>,

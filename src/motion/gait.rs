@@ -8,18 +8,18 @@ use crate::error::Result;
 use crate::geometry::DVec3;
 use crate::geometry::shape::bounds;
 
-/// Sampled poses per second of the motion, and their minimum and maximum number.
+/// Sampled poses per second of the motion, and the minimum and maximum number of poses in all.
 const RATE: f64 = 60.0;
 const POSES: (f64, f64) = (24.0, 240.0);
-/// Maximum vertices posed, over all poses: bounds the time of the analysis.
+/// Maximum number of vertices in all poses together: limits the time of the analysis.
 const MAX_VERTICES: f64 = 5e7;
-/// Tolerance, as a fraction of a figure's height: standing parts may be this far above the lowest part of their pose, and that part as far
-/// above the ground. The ground is the quantile `REACHED` of the lowest parts' heights, so that neither a toe that digs in nor a jump hides
-/// a walk.
+/// Tolerance, as a fraction of a figure's height: a standing part may be this far above the lowest part of its pose, and that lowest part
+/// this far above the ground. The ground is the quantile `REACHED` of the lowest parts' heights, so that neither a toe that digs in nor a
+/// jump hides a walk.
 const STANDS: f64 = 0.015;
 const REACHED: f64 = 0.4;
-/// Parts that rise or fall by more than the fraction `LEVEL` of their horizontal path do not stand, unless they do so by at most the
-/// fraction `STILL` of that tolerance.
+/// A part that rises or falls by more than the fraction `LEVEL` of its horizontal path does not count as standing, unless it rises or
+/// falls by at most the fraction `STILL` of the tolerance `STANDS`.
 const LEVEL: f64 = 0.25;
 const STILL: f64 = 0.1;
 /// Maximum spread of steady velocities, as a fraction of the speed: walks have up to 0.22, runs 0.45.
@@ -30,9 +30,10 @@ const MIN_STANDING: f64 = 0.2;
 /// How a motion's lowest parts move.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gait {
-    /// Mean velocity of standing parts (m/s, horizontal): the median over the times when something stands.
+    /// Horizontal velocity of the standing parts (m/s): the median, component by component, of their mean velocities at the times when
+    /// something stands.
     pub velocity: DVec3,
-    /// Median deviation from it at those times (m/s).
+    /// Median deviation of those mean velocities from `velocity` (m/s).
     pub spread: f64,
     /// Fraction of the time that something stands, 0..=1.
     pub standing: f64,
@@ -54,7 +55,7 @@ impl Gait {
     }
 }
 
-/// Analyses a motion (m, Y up) from one time to another (s); `None` if nothing stands for long.
+/// Analyses a motion (m, Y up) from one time to another (s); `None` if parts stand for less than a fifth of the time.
 ///
 /// # Errors
 /// A pose that cannot be computed.

@@ -95,8 +95,8 @@ pub trait Motion: Send + Sync {
         false
     }
 
-    /// As [`Motion::velocities`] over the coming `step` (s, above 0), or over the step before if the motion's data end sooner, so that
-    /// velocities do not drop to 0 at the last frame.
+    /// As [`Motion::velocities`] over the coming `step` (s, above 0), or over the step before `time` if the motion's data end within the
+    /// coming one, so that velocities do not drop to 0 at the last frame.
     ///
     /// # Errors
     /// As [`Motion::pose`].

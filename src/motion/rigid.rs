@@ -26,7 +26,7 @@ pub struct Keys {
 }
 
 impl Keys {
-    /// Checks the order of the keys; no keys are the identity.
+    /// Checks the order of the keys; without any, the motion is the identity.
     ///
     /// # Errors
     /// Times that do not increase, or a number that is not finite.

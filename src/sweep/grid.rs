@@ -14,7 +14,7 @@ use crate::motion::{Keys, Rigid};
 use crate::numeric::blocks::{Block, BlockEdit, DIM};
 use crate::vdb::FloatGrid;
 
-/// Blocks per batch added to the grid; bounds the memory in addition to the grid.
+/// Blocks per batch added to the grid; limits the memory that is needed besides the grid.
 const BATCH: usize = 2048;
 /// An unbounded window.
 const EVERYWHERE: Window = Window { min: [i32::MIN; 3], max: [i32::MAX; 3] };
@@ -92,7 +92,7 @@ pub fn fill(ctx: &Context, faces: Vec<Face>, lattice: Lattice, half_width: f32) 
     fill_within(ctx, faces, lattice, half_width, ALL_VOXELS)
 }
 
-/// As [`fill`], in a box of voxels (from the lattice's origin voxel).
+/// As [`fill`], in a box of voxels (counted from the lattice's origin voxel).
 fn fill_within(
     ctx: &Context,
     faces: Vec<Face>,

@@ -1,6 +1,6 @@
 //! The volume that moving meshes sweep in an interval of time.
 //!
-//! [`chain`] is exact up to a tolerance: signed space-time tetrahedra (`chain.rs`), poses dense enough for arcs (`moving_mesh/body.rs`),
+//! [`chain`] is exact up to a tolerance: signed space-time tetrahedra (`chain/mod.rs`), poses dense enough for arcs (`moving_mesh/body.rs`),
 //! edges split where their ends move differently (`moving_mesh/refine.rs`), passages ordered in time where a surface folds inside out
 //! (`chain/folds.rs`, `moving_mesh/passages.rs`), winding numbers from exact line crossings (room `distance`,
 //! `signed_distance/exposure.rs`), the parts of faces that bound the volume (`signed_distance/bins.rs`, `chain/facets.rs`; `chain/patch.rs`
@@ -90,9 +90,9 @@ impl Settings {
     }
 }
 
-/// Peak memory (bytes) of building a level set whose surface has an area of `area` m2.
+/// Peak memory (bytes) of building a level set whose surface has an area of `area` m2, with cells of `cell` m.
 pub fn surface_bytes(area: f64, cell: f64) -> u64 {
-    // A band of six voxels crosses 1.6 blocks of 8 voxels on average, at slightly over four bytes a voxel; an inclined surface crosses
+    // A band of six voxels crosses 1.6 blocks of 8 voxels on average, at slightly over four bytes per voxel; an inclined surface crosses
     // more; writing a file needs as much again.
     (area / (cell * cell) * 128.0).min(1.0e18) as u64
 }

@@ -1,5 +1,5 @@
 //! The thesis' swept volume (section 3.2): the union of N + 1 sampled poses, dilated, then smoothed.
-//! A baseline for tests and benchmarks; with `samples = 1` and no dilation it is Fig. 3.3a.
+//! A baseline for tests and benchmarks; with `samples = 1`, neither dilated nor smoothed, it is Fig. 3.3a.
 
 use super::Body;
 use crate::context::Context;
@@ -18,7 +18,7 @@ pub struct SamplesSettings {
     pub samples: u32,
     /// Dilation before smoothing (cells); compensates for the shrinkage of smoothing. 0: none.
     pub dilate: f32,
-    /// Gaussian smoothing passes of one cell. 0: none.
+    /// Number of Gaussian smoothing passes with a width of one cell. 0: none.
     pub smooth: u32,
     /// Accuracy of the dilation and smoothing.
     pub scheme: level_set::Scheme,

@@ -11,16 +11,16 @@ const LEAF: usize = 4;
 const GRAIN: usize = 1024;
 /// Size of the stack of a search, which has at most one pending node for each of at most 30 levels.
 const STACK: usize = 64;
-/// A triangle whose first corner has a smaller sine is degenerate: its edges are searched instead, which lie within this fraction of its
-/// length.
+/// A triangle is degenerate if the sine of its first corner's angle is at most this: all of it lies within this fraction of its length from
+/// its edges, and only these are searched.
 const NEEDLE: f64 = 1e-8;
-/// Distances up to this fraction of the largest coordinate are rounding in 64 bits, and count as 0; 32-bit mesh coordinates are spaced 6e-8
-/// of it.
+/// Distances up to this fraction of the largest coordinate are rounding in 64 bits, and count as 0; meshes have 32-bit coordinates, whose
+/// spacing there is 6e-8 of the coordinate.
 const ROUNDING: f64 = 1e-12;
 /// Weights of a triangle's centre and of each corner, as shares of its area: exact for quadratic integrands.
 const CENTRE: f64 = 0.75;
 const CORNER: f64 = 1.0 / 12.0;
-/// Fraction of the weight of the points that lie within [`Deviation::p95`].
+/// Fraction of the points, by weight, whose distance is at most [`Deviation::p95`].
 const PERCENTILE: f64 = 0.95;
 
 /// Minimum and maximum corner of a box (m).
@@ -135,7 +135,7 @@ fn points(mesh: &TriMesh) -> Vec<(DVec3, f64)> {
 pub struct NearestTree {
     /// One for each node; the children of node i are 2 i + 1 and 2 i + 2.
     boxes: Vec<Span>,
-    /// In the order of the leaves, which are the last nodes and share them evenly.
+    /// In the order of the leaves, which are the last nodes and share the facets evenly.
     facets: Vec<Facet>,
     /// Levels below the root.
     levels: u32,
@@ -309,7 +309,7 @@ impl Facet {
     }
 
     /// The position nearest to a point: on the face if the point lies on the inner side of all edges, else on one of these (Ericson,
-    /// Real-Time Collision Detection, 2005, 5.1.5). Planes along the edges separate the regions, not, as there, products of projections,
+    /// Real-Time Collision Detection, 2005, 5.1.5). Here planes along the edges separate the regions; Ericson uses products of projections,
     /// whose rounding grows with the square of a needle's length.
     pub(in crate::geometry) fn nearest(&self, point: DVec3, facet: usize) -> FacetPoint {
         let [a, b, c] = self.corners.map(|corner| corner.cast::<f64>());

@@ -13,7 +13,7 @@ pub(in crate::geometry) struct Doubles {
 }
 
 impl Doubles {
-    /// Duplicates among triangles with these edges. Doubled triangles that are the common walls of closed parts cancel, and stay.
+    /// Duplicates among triangles with these edges. Doubled triangles that are the common walls of closed parts cancel, and are kept.
     pub(in crate::geometry) fn of(triangles: &[[u32; 3]], uses: &[Use]) -> Self {
         let count = triangles.len();
         let mut out = Self { is_double: vec![false; count], is_two_sided: vec![false; count] };
@@ -56,8 +56,8 @@ pub fn rotated<T: Ord + Copy>([a, b, c]: [T; 3]) -> [T; 3] {
     [a, b, c].min([b, c, a]).min([c, a, b])
 }
 
-/// Triangles sorted by their vertices, which ascend: each with its index, and whether its own order of the vertices ascends too, up to
-/// rotation.
+/// Triangles sorted by their vertices: each with its vertices in ascending order, its index, and whether its own order of the vertices
+/// is a rotation of the ascending one.
 pub fn by_vertices(triangles: &[[u32; 3]]) -> Vec<([u32; 3], u32, bool)> {
     let sorted = |(triangle, number): (&[u32; 3], u32)| {
         let [a, b, c] = rotated(*triangle);
@@ -68,8 +68,9 @@ pub fn by_vertices(triangles: &[[u32; 3]]) -> Vec<([u32; 3], u32, bool)> {
     order
 }
 
-/// Marks the triangles of parts that coincide with an earlier part, triangle by triangle: their keys are the same. `is_compared` selects
-/// parts by their first triangle.
+/// Marks the triangles of parts that coincide with an earlier part, triangle by triangle: their keys are the same. Only parts for whose
+/// first
+/// triangle `is_compared` is true are compared.
 pub fn copies<K: Ord + Copy + Send>(
     parts: &[u32],
     is_compared: impl Fn(usize) -> bool,

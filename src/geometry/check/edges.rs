@@ -6,12 +6,12 @@ use crate::geometry::lists::Lists;
 /// An edge, smaller vertex index first, and a triangle that has it.
 pub type Use = ([u32; 2], u32);
 
-/// The neighbour across an edge without a second triangle.
+/// Sentinel: no neighbour across an edge, as it does not have exactly two triangles; or no patch yet.
 const NONE: u32 = u32::MAX;
 /// Minimum triangles of a closed part: a tetrahedron.
 const MIN_TRIANGLES: u32 = 4;
 
-/// The edges of triangles over `vertices` vertices, sorted, each with all triangles that have it.
+/// The edges of triangles over `vertices` vertices, sorted, each listed once for every triangle that has it.
 pub fn edge_uses(vertices: usize, triangles: &[[u32; 3]]) -> Vec<Use> {
     // Sorted by the smaller vertex by counting, then by comparisons: few edges begin at one vertex.
     let of_triangle = |(triangle, number)| sides(triangle).map(|ends| (ends[0], (ends, number)));
@@ -72,7 +72,7 @@ pub fn mark_closed_manifolds(triangles: &[[u32; 3]], uses: &[Use], parts: &[u32]
 pub struct Agreement {
     /// For each triangle, whether it must be flipped.
     pub turned: Vec<bool>,
-    /// The patch of each triangle, named by its first triangle: triangles connected by edges that have exactly two.
+    /// The patch of each triangle, named by its first triangle: triangles connected by edges that have exactly two triangles.
     pub patch: Vec<u32>,
     /// The patches with only one side (a Mobius strip, a Klein bottle), where no choice makes all agree; ascending.
     pub one_sided: Vec<u32>,

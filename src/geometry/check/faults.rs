@@ -14,7 +14,7 @@ use crate::geometry::{DVec3, TriMesh};
 
 /// Triangles per task.
 const GRAIN: usize = 512;
-/// Volumes of parts up to this many cubes of their size count as 0: rounding produces as much.
+/// The volume of a part counts as 0 if it is at most this fraction of the cube of the part's size: rounding alone can produce as much.
 const ROUNDING: f64 = 1e-12;
 
 /// Faults and properties of a mesh. Except in `by_index`, vertices at the same position count as one, and so do vertices on open edges that
@@ -48,8 +48,8 @@ pub struct Faults {
     /// Connected parts; parts that touch in a vertex are one.
     pub parts: usize,
     /// Parts whose volume has the opposite sign of the whole mesh's, so that they enclose nothing; here parts that touch only in a vertex
-    /// are separate. Cavities, whose outermost corners lie within parts of the whole's sign, do not count. Counted only where all edges
-    /// have two triangles that agree.
+    /// are separate. Cavities, whose outermost corners lie within parts that have the whole mesh's sign, do not count. Counted only where
+    /// all edges have two triangles that agree.
     pub inverted_parts: usize,
     /// Area (m2).
     pub area: f64,
@@ -219,7 +219,7 @@ impl<'a> Part<'a> {
         triangles.iter().flat_map(|&triangle| mesh.corners(triangle))
     }
 
-    /// Whether its outermost corners lie within others, which face outward (1) or inward (-1).
+    /// Whether its outermost corners lie within `others`, which face outward (`turn` = 1) or inward (-1).
     fn is_within(&self, mesh: &TriMesh, others: &Bvh, turn: i32) -> bool {
         let corners = || Self::corners(mesh, self.triangles);
         (0..3).all(|axis| {

@@ -2,7 +2,7 @@
 //!
 //! The cases are those of P. Guigue and O. Devillers, *Fast and Robust Triangle-Triangle Overlap Test Using Orientation Predicates*
 //! (Journal of Graphics Tools 8, 2003), extended to common corners and edges. Two triangles whose planes differ meet along the line where
-//! the planes do; the sign of four points orders the ends of both triangles on it.
+//! the planes do; the orientations of sets of four points give the order of both triangles' ends on it.
 
 use super::predicates::{orient2d, orient3d};
 use crate::geometry::Vec3;
@@ -22,8 +22,8 @@ pub enum Meeting {
 
 type Triangle = [Vec3; 3];
 
-/// How two triangles meet. Corners at the same position are common; both must have an area ([`super::predicates::is_flat`]) and finite
-/// coordinates.
+/// How two triangles meet. Corners at the same position are common; both triangles must have an area ([`super::predicates::is_flat`]) and
+/// finite coordinates.
 pub fn meeting(first: &[Vec3; 3], second: &[Vec3; 3]) -> Meeting {
     let common = first.map(|corner| second.iter().position(|other| *other == corner));
     match common {
@@ -43,7 +43,7 @@ fn rotated_to(triangle: &Triangle, corner: usize) -> Triangle {
     [0, 1, 2].map(|next| triangle[(corner + next) % 3])
 }
 
-/// Triangles with a common edge, the first two corners of `first`: they overlap if folded along it.
+/// Triangles with a common edge, the first two corners of `first`: they overlap if folded onto each other along it.
 fn along_edge(first: &Triangle, second: &Triangle) -> Meeting {
     let [a, b, c] = *first;
     let Some(&apex) = second.iter().find(|corner| !first.contains(corner)) else { return Meeting::Overlap };
@@ -130,7 +130,7 @@ impl View {
     fn of(triangle: &Triangle) -> Self {
         let [a, b, c] = *triangle;
         let normal = (b - a).cast::<f64>().cross(&(c - a).cast::<f64>());
-        // Any with an area will do; the widest decides most cases without exact sums.
+        // Any view in which the triangle has an area will do; the one with the largest area decides most cases without exact sums.
         for next in 0..3 {
             let axis = (normal.iamax() + next) % 3;
             let view = Self((axis + 1) % 3, (axis + 2) % 3);

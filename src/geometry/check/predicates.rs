@@ -1,9 +1,9 @@
 //! Exact orientation of points with 32-bit coordinates: signs of determinants, never decided by rounding.
 //!
 //! After J. R. Shewchuk, *Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates* (Discrete & Computational
-//! Geometry 18, 1997): 64-bit arithmetic decides where the determinant exceeds its error bound (bounds A of 4.2 and 4.3); else its terms
-//! are summed without error as an expansion (theorem 10). Products of two coordinates have 48 bits and those of three 72, within the range
-//! of exponents: nothing overflows or underflows.
+//! Geometry 18, 1997): 64-bit arithmetic decides where the determinant exceeds its error bound (bounds A of sections 4.2 and 4.3); else its
+//! terms are summed without error as an expansion (theorem 10). Products of two coordinates have 48 bits and those of three 72, within the
+//! range of exponents: nothing overflows or underflows.
 
 use crate::geometry::{DVec3, Vec3};
 

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 pub struct Topology {
     /// Triangles.
     pub triangles: usize,
-    /// Triangles that use a vertex twice; nothing else counts them.
+    /// Triangles that use a vertex twice; apart from `triangles`, nothing else counts them.
     pub collapsed_triangles: usize,
     /// Triangles with the vertices of an earlier one, in any order; everything else counts them too.
     pub doubled_triangles: usize,
@@ -53,14 +53,14 @@ impl Topology {
     }
 }
 
-/// The vertices, and the edges (smaller vertex index first), where triangles do not form a closed 2-manifold; each triangle has three
-/// different vertices.
+/// The vertices, and the edges (smaller vertex index first), where triangles do not form a closed 2-manifold; each triangle must have
+/// three different vertices.
 pub fn faulty(vertices: usize, triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<[u32; 2]>) {
     let survey = Survey::of(vertices, triangles);
     (survey.non_manifold_vertices, [survey.open, survey.non_manifold_edges, survey.turned].concat())
 }
 
-/// The components of a mesh: indices of triangles that edges connect, ascending; each triangle has three different vertices.
+/// The components of a mesh: indices of triangles that edges connect, ascending; each triangle must have three different vertices.
 pub fn components(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
     let mut sets = Sets::new(triangles.len());
     for pair in half_edges(triangles).windows(2).filter(|pair| pair[0].0 == pair[1].0) {

@@ -88,7 +88,7 @@ pub struct DetailedMesh {
 }
 
 impl DetailedMesh {
-    /// A mesh without vertices and faces whose arrays have the same names.
+    /// A mesh without vertices or faces, but with arrays of the same names.
     pub fn emptied(&self) -> Self {
         let uvs = self.uvs.as_ref().map(|uvs| Uvs {
             coordinates: Vec::new(),

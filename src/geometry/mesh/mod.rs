@@ -152,7 +152,7 @@ pub fn used(count: usize, triangles: &[[u32; 3]]) -> Option<Vec<u32>> {
     is_used.contains(&false).then(used)
 }
 
-/// Triangles re-indexed to the vertices `used`, which ascend and include all that they use.
+/// Triangles re-indexed to the vertices `used`, which ascend and include all that the triangles use.
 pub fn renumbered(triangles: &[[u32; 3]], used: &[u32]) -> Vec<[u32; 3]> {
     let mut positions = vec![0; used.last().map_or(0, |&last| last as usize + 1)];
     used.iter().zip(0..).for_each(|(&vertex, position)| positions[vertex as usize] = position);

@@ -103,8 +103,9 @@ impl PolygonMesh {
         self.corners.len().saturating_sub(2 * self.ends.len())
     }
 
-    /// Triangulates all polygons: calls `each` for each triangle with its polygon's start in `corners` and vertices, and the triangle's corners
-    /// among these.
+    /// Triangulates all polygons: calls `each` for each triangle with the start of its polygon in `corners`, the polygon's vertices, and
+    /// the
+    /// indices of the triangle's corners among these.
     fn cut_all(&self, mut each: impl FnMut(usize, &[u32], [usize; 3])) {
         let mut begin = 0;
         for polygon in self.polygons() {

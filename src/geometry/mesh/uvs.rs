@@ -15,7 +15,7 @@ pub struct Uvs {
 }
 
 impl Uvs {
-    /// Coordinates 0, 0 for meshes without any, with these numbers of vertices and triangles; by corner, or by vertex.
+    /// Coordinates 0, 0 for meshes without any, with these numbers of vertices and triangles; by corner if `has_corners`, else by vertex.
     pub fn zeros(has_corners: bool, vertices: usize, faces: usize) -> Self {
         match has_corners {
             true => {

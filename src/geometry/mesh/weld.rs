@@ -9,9 +9,9 @@
 //! Three rounds, each for the edges that the previous one left open:
 //!
 //! 1. Within [`STEPS`] adjacent 32-bit numbers on each axis, at the precision of each coordinate.
-//! 2. The same, but steps are no finer than at half the mesh's extent: programs that rotate a mesh leave 1e-9 in one triangle and 0 in
-//!    another, which by their own size are millions of steps apart. Only where it closes a part wholly: it may not bridge a slit of a
-//!    mesh that is open anyway.
+//! 2. The same, but steps are no finer than those at a coordinate of half the open edges' extent: programs that rotate a mesh leave 1e-9
+//!    in one triangle and 0 in another, which by their own size are millions of steps apart. Only where it closes a part wholly: it may
+//!    not bridge a slit of a mesh that is open anyway.
 //! 3. Chains of corners, each within rounding of the next and the ends further apart. Only where it closes a part, and reported.
 //!
 //! The nearest corners are joined first, and never both ends of an edge: a triangle as thin as the rounding is kept.
@@ -82,14 +82,14 @@ impl Weld {
         let first = self.ambiguous.first()?;
         let (count, s) = (self.ambiguous.len(), if self.ambiguous.len() == 1 { "" } else { "s" });
         Some(format!(
-            "{count} corner{s} on open edges lie{} within rounding of others, but which of them are one is not clear (vertex {} is the \
+            "{count} corner{s} on open edges lie{} within rounding of others, but it is not clear which belong together (vertex {} is the \
              first): look at `frazil mesh check`, or save the mesh nearer to the origin",
             if count == 1 { "s" } else { "" },
             first + 1
         ))
     }
 
-    /// Copies to each vertex that is not at its first vertex' position the value of that vertex.
+    /// Gives each vertex that is not at the position of its first vertex the value of that first vertex.
     pub fn unify<T: Copy>(&self, values: &mut [T]) {
         for &vertex in &self.near {
             values[vertex as usize] = values[self.firsts[vertex as usize] as usize];
@@ -107,7 +107,7 @@ pub struct Boundary {
 }
 
 impl Boundary {
-    /// `firsts` has the first vertex at the same position for each; triangles that use one of these twice do not count.
+    /// `firsts` has, for each vertex, the first one at the same position; triangles that use one of these twice do not count.
     pub fn of(triangles: &[[u32; 3]], firsts: &[u32]) -> Self {
         let joined = |corners: &[u32; 3]| corners.map(|vertex| firsts[vertex as usize]);
         let whole = triangles.iter().map(joined).filter(|[a, b, c]| a != b && b != c && c != a);
@@ -157,7 +157,7 @@ struct Ruler {
 impl Ruler {
     const OWN: Self = Self { from: 0.0, step: 0.0 };
 
-    /// With steps no finer than at half the longest side of positions; `None` if they have no extent.
+    /// With steps no finer than those at a coordinate of half the longest side of the positions' box; `None` if they have no extent.
     fn of_extent(positions: &[[f32; 3]]) -> Option<Self> {
         let side = |axis: usize| {
             let of_axis = || positions.iter().map(|position| position[axis]);

@@ -132,7 +132,7 @@ impl Bvh {
         });
     }
 
-    /// Calls `see` with hits, in no order; it returns the new limit, or none to stop.
+    /// Calls `see` with hits, in no order; `see` returns the new limit, or none to stop.
     fn traverse(
         &self,
         origin: DVec3,

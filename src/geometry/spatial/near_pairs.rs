@@ -21,7 +21,7 @@ pub(in crate::geometry) struct NearPairs<'a> {
     mesh: &'a TriMesh,
     /// Triangles without a hub.
     others: Boxes,
-    /// Triangles with a hub; with several, the one with most triangles.
+    /// Triangles by their hub: if a triangle has several, by the one with most triangles.
     fans: Vec<Fan>,
     /// The fans, as one box each.
     all_fans: Boxes,
@@ -65,7 +65,7 @@ impl<'a> NearPairs<'a> {
     }
 
     /// Calls `see` with the triangles that a triangle may meet elsewhere than in common corners and edges, or along a common edge; over all
-    /// triangles every such pair is seen once, from one of its two sides.
+    /// triangles every such pair is seen once, from one of its two triangles.
     pub(in crate::geometry) fn of_triangle(&self, triangle: usize, mut see: impl FnMut(usize)) {
         let (own, here) = (self.fan_of[triangle], span(self.mesh, triangle));
         self.others.touching(here, |other| {

@@ -157,7 +157,7 @@ struct Node {
     /// Remaining points below it.
     remaining: usize,
     parent: usize,
-    /// The first of two children, or none.
+    /// Its two children; none for a leaf.
     children: Option<[usize; 2]>,
     /// Range of its points in `order`.
     range: std::ops::Range<usize>,

@@ -141,7 +141,7 @@ impl<'a> Sweep<'a> {
         let [comes_from_left, goes_left] = [before, after].map(|other| self.rank[other] < self.rank[corner]);
         let is_convex = turn(self.positions[before], self.positions[corner], self.positions[after]) > 0;
         if comes_from_left {
-            // A start, a split, or a corner of a lower side inserted it.
+            // The edge `before` was inserted at a start, a split, or a corner of a lower side.
             self.join_merged(before, corner);
             self.remove(before);
         }

@@ -285,12 +285,12 @@ fn remove_additions(object: &mut Map<String, Value>) {
     object.remove("extras");
 }
 
-/// The document, once everything that it references exists.
+/// The document, after a check that everything that it references exists.
 fn checked(root: Value) -> Result<Document, String> {
     let mut root: gltf::json::Root =
         serde_json::from_value(root).map_err(|error| one_line(&error.to_string()))?;
-    // `Document::from_json` reads the bounds of position accessors before it checks that the accessors exist, and requires both;
-    // nothing here needs them.
+    // `Document::from_json` requires the bounds of position accessors, and reads them before it checks that the accessors exist;
+    // nothing here needs bounds.
     for attribute in root.meshes.iter().flat_map(|mesh| &mesh.primitives).flat_map(|p| p.attributes.values())
     {
         let accessor = root

@@ -24,7 +24,7 @@ use file::File;
 use nodes::Node;
 use skin::Vertices;
 
-/// A repeat whose ends differ by more than this fraction of the character's size starts with a jump.
+/// Repeats of a clip start with a jump if its first and last pose differ by more than this fraction of the character's size.
 const SAME_POSE: f64 = 1e-3;
 /// Kinks this close to the ends of an interval (s) count as the ends: times in files are 32-bit floats.
 const AT_END: f64 = 2e-5;
@@ -41,7 +41,7 @@ pub struct Play {
     pub clip: Option<String>,
     /// Whether the clip starts again when it ends.
     pub repeat: bool,
-    /// Time of the clip's first key (s).
+    /// Time in the shot at which the clip's first key plays (s).
     pub start: f64,
 }
 

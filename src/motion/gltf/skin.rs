@@ -184,7 +184,7 @@ impl Vertices {
         if targets.iter().any(|target| target.len() != positions.len()) {
             return Err("a morph target has another number of vertices".into());
         }
-        // Primitives with fewer targets do not move under the others.
+        // A primitive with fewer targets is not moved by the others.
         while part.deltas.len() < targets.len() {
             part.deltas.push(vec![DVec3::zeros(); part.rest.len()]);
         }
@@ -293,7 +293,7 @@ impl Part {
 }
 
 impl FileVertices {
-    /// Adds a copy of some vertices and of the triangles over them; `shift` is the index of a moving vertex' copy minus its own.
+    /// Adds a copy of some vertices and of the triangles over them; `shift` is the index of a moving vertex' copy minus that of the vertex.
     fn copy(&mut self, vertices: Range<usize>, triangles: Range<usize>, shift: u32) {
         let by = (self.vertices.len() - vertices.start) as u32;
         for at in triangles {
@@ -307,7 +307,7 @@ impl FileVertices {
         }
     }
 
-    /// Adds a primitive: its vertices, by the vertices that move like them, and its triangles over those.
+    /// Adds a primitive: its vertices, with the vertices that move like them (`numbers`), and its triangles over its own vertices.
     fn add(
         &mut self,
         file: &File,

@@ -91,7 +91,7 @@ mod tests {
                 "{text}"
             );
         }
-        // One letter too many, non-zero unused bits, signs of another alphabet, a line end, padding inside.
+        // One character too many, non-zero unused bits, characters of another alphabet, a line end, padding inside.
         for wrong in ["Z", "Zm9vY", "Zh==", "Zm9=", "Zm-v", "Zm9v\n", "Zg==Zm9v", "Zg==="] {
             assert_eq!(embedded(&format!("data:;base64,{wrong}")), None, "{wrong}");
         }

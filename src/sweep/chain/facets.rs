@@ -30,11 +30,11 @@ const HAIR: f64 = 0.005 * UNITS as f64;
 const THIN_HAIRS: f64 = THIN * UNITS as f64 / HAIR;
 /// Faces longer than this (cells) are sampled at more than one point.
 const SMALL: f32 = 1.5;
-/// Scan lines, a cell apart, cross most faces longer than this (cells).
+/// A face is a [`SLIVER`] if it is longer than this (cells) but no line crosses it: lines are a cell apart and cross most such faces.
 const LONG: f32 = 3.0;
 /// Distance between the samples of a long face (fixed-point units).
 const SPACING: f64 = 1.2 * UNITS as f64;
-/// The same where a face is sampled again because it is buried among open ones.
+/// As [`SPACING`], where a face that is buried at all its samples is sampled again because it has open faces around it.
 const CLOSER: f64 = 0.6 * UNITS as f64;
 /// Sample points at corners are moved this fraction of the way to the centre, away from the edges shared with neighbours.
 const INSET: f64 = 0.05;
@@ -48,7 +48,7 @@ const LOOSE: u8 = 8;
 const SLIVER: u8 = 16;
 /// Flag of a small open face in a stack, which patches may not cover.
 const SPECK: u8 = 32;
-/// The small faces of a stack are sampled in bins with at most this many faces.
+/// The small faces of a stack are sampled only in bins with at most this many faces.
 const MANY: usize = 2000;
 /// A face in front of which there is a gap narrower than this (hairs) is not open: sheets of successive poses leave such slits, within the
 /// motion's tolerance.
@@ -227,7 +227,7 @@ impl Clipper<'_> {
         nearby
     }
 
-    /// Adds the open parts of a part of a face, halved as far as necessary; returns whether it is open at all its samples.
+    /// Adds the open parts of a part of a face, halved as far as necessary; returns whether it is open at each of its samples.
     fn dice(&mut self, id: usize, v: Corners, hair: Point, bin_flags: &[u8], out: &mut Vec<Part>) -> bool {
         match self.nearby_flags(id, v, bin_flags) {
             // No flags: no distance is wanted there.
@@ -343,7 +343,7 @@ impl Clipper<'_> {
         classify(self.bins, self.exposure, at, hair, &mut self.prisms)
     }
 
-    /// Whether the surface near a point does not consist of patches only, so that samples are needed.
+    /// Whether samples are needed at a point: its bin is not a stack, where the surface consists only of patches.
     fn is_sampled(&self, at: Point) -> bool {
         self.bins.of_voxel(voxel_of(at)).is_some_and(|bin| !self.exposure.stacks[bin])
     }

@@ -195,7 +195,7 @@ fn negative_blocks(faces: &[Face], window: &Window) -> Vec<[i32; 3]> {
 #[derive(Default)]
 struct Returns {
     ids: Vec<PassageId>,
-    /// Their sample points with a negative winding number at the first pose, where the number may reach 0 for the first time.
+    /// Their sample points with a negative winding number at the first pose, where the passage may be the first to bring it to 0.
     early: Vec<Early>,
 }
 
@@ -220,7 +220,7 @@ fn returns(ctx: &Context, poses: &Poses<'_>, step: usize, triangles: &[u32]) -> 
     let points: Vec<DVec3> = passages.iter().flat_map(Passage::samples).collect();
     let (during, first) = (PreparedStep::new(poses, step, &points), PreparedPose::new(poses, 0, &points));
     let test = |passage: &Passage| -> Result<Option<(PassageId, Vec<Early>)>> {
-        // A point that many faces pass takes long.
+        // A point that many faces pass takes a long time.
         ctx.check()?;
         let mut early = Vec::new();
         for at in passage.samples() {
@@ -238,7 +238,7 @@ fn returns(ctx: &Context, poses: &Poses<'_>, step: usize, triangles: &[u32]) -> 
     Ok(Returns { ids, early: found.into_iter().flat_map(|(_, early)| early).collect() })
 }
 
-/// The passages whose points are not brought to 0 by an earlier step.
+/// The passages with a point whose winding number no earlier step brings to 0.
 fn first_rises(ctx: &Context, poses: &Poses<'_>, mut early: Vec<Early>) -> Result<Vec<PassageId>> {
     let mut first = Vec::new();
     for step in 0..poses.levels.len() - 1 {

@@ -1,8 +1,9 @@
 //! The surface of a stack of sheets.
 //!
 //! A body that turns about an axis of near symmetry sweeps hundreds of nearly coincident sheets; its surface is a mosaic of slivers, too
-//! small to sample each. But it is smooth except at its edges, and lines through voxels meet it at least once per cell: around such a spot
-//! the plane of the exposed face approximates the surface, as far as the volume lies close behind the plane and not in front of it.
+//! small to be sampled one by one. But it is smooth except at its edges, and lines through voxels meet it at least once per cell. Around
+//! the spot of each meeting the plane of the exposed face approximates the surface, as far as the volume lies close behind the plane and
+//! not in front of it.
 
 use rayon::prelude::*;
 
@@ -23,7 +24,7 @@ const OFF_BESIDE: f64 = 2.0 * OFF;
 const HALF: f64 = 0.51;
 /// Maximum radius (cells) of other patches.
 const REACH: f64 = 1.0;
-/// Bisections that find where the surface leaves a patch's plane: to 1/64 of its radius.
+/// Bisections that find where the surface leaves a patch's plane: to 1/64 of [`REACH`].
 const HALVINGS: usize = 4;
 /// If a patch's mean radius, relative to [`REACH`], is less than this, its whole face becomes a facet too.
 const MIN_REACH: f64 = 0.25;

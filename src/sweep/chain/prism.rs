@@ -12,8 +12,8 @@ const CLEAR: f32 = 1e-3;
 /// Maximum distance (cells) between a query point and the point beside it, whose winding numbers are found together.
 pub const BESIDE: f32 = 0.02;
 
-/// Height above the triangle's plane, then for each edge the distance to its inner side (cells), as linear functions of a position: `f[0] *
-/// p.x + f[1] * p.y + f[2] * p.z + f[3]`. One cache line.
+/// Height above the triangle's plane, then for each edge the distance from it (cells; positive on the triangle's side), as linear functions
+/// of a position: `f[0] * p.x + f[1] * p.y + f[2] * p.z + f[3]`. One cache line.
 #[repr(align(64))]
 #[derive(Debug, Clone, Copy)]
 pub struct Prism([[f32; 4]; 4]);
@@ -39,7 +39,7 @@ const CACHED: usize = 12;
 /// Cache of the prisms of the bins that one thread queried last.
 #[derive(Default)]
 pub struct Prisms {
-    /// Identifies the chain that they belong to.
+    /// Identifies the chain that the prisms belong to.
     chain: u64,
     /// Indices of the bins.
     bins: Vec<usize>,
@@ -81,7 +81,7 @@ impl Prisms {
 #[derive(Default)]
 pub struct BinPrisms {
     groups: Vec<Group>,
-    /// The face of each, lane after lane.
+    /// The face of each prism, lane after lane.
     faces: Vec<u32>,
     unclear: Vec<u32>,
 }

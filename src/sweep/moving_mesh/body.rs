@@ -20,11 +20,11 @@ use crate::motion::Motion;
 use crate::sweep::chain::{Weights, boundary};
 use crate::sweep::window::Window;
 
-/// Factor on the number of steps at which a vertex' path in a step is as long as the pieces that edges are split into; by measurement, this
-/// value gave the fewest faces and the shortest time.
+/// Multiplies the number of steps with which a vertex' path in one step would be as long as the pieces that edges are split into; in
+/// measurements, this value gave the fewest faces and the shortest time.
 const STEP_FACTOR: f64 = 1.5;
-/// The faces of edges need at most as many steps as paths of this length (cells) do, or [`MAX_OVER_ARCS`] times as many as arcs do,
-/// whichever is more; also measured.
+/// For the faces that edges sweep, there are at most as many steps as make a path in one step this long (cells), or [`MAX_OVER_ARCS`]
+/// times as many as arcs need, whichever is more; also measured.
 const MIN_PATH: f64 = 4.0;
 const MAX_OVER_ARCS: f64 = 1.5;
 /// Maximum number of steps in an interval between two breaks of a motion.
@@ -184,12 +184,13 @@ impl Body {
         self.shape.oriented.as_deref().unwrap_or(self.motion.triangles())
     }
 
-    /// A sentence about the part of its orientation that is ambiguous, without its name.
+    /// A sentence about the part of its orientation that is ambiguous, without the body's name.
     pub fn doubts(&self) -> Option<&str> {
         self.shape.doubts.as_deref()
     }
 
-    /// A warning about triangles that disagree about inside and outside, as a sentence without its name.
+    /// A warning that its orientation is ambiguous, or that its triangles disagree about inside and outside: a sentence without the body's
+    /// name.
     pub fn warning(&self) -> Option<String> {
         let edges = self.contradictions();
         let disagree = || {

@@ -11,7 +11,7 @@ use crate::sweep::chain::STILL;
 
 /// Minimum edge (fixed-point units) of the boxes that tetrahedra and faces are sorted into.
 const BOX: f64 = UNITS as f64;
-/// Maximum number of boxes per item that is sorted into them.
+/// Maximum total number of boxes, as a multiple of the number of items.
 const BOXES: usize = 4;
 /// Sample points of a tetrahedron: barycentric weights, off all symmetries.
 const SAMPLES: [[f64; 4]; 5] = [
@@ -33,7 +33,7 @@ pub fn face(simplex: &Simplex, level: &[Fixed]) -> Face {
 pub struct PassageId {
     /// The triangle whose prism it is part of.
     pub triangle: u32,
-    /// The step from this pose to the next.
+    /// Index of the step, which leads from the pose of the same index to the next one.
     pub step: u32,
     /// Which of the prism's three tetrahedra, from 0.
     pub part: u32,
@@ -46,7 +46,7 @@ pub struct Passage {
     /// 1 when the surface moves outward, -1 when inward.
     pub sign: i32,
     corners: [DVec3; 4],
-    /// Rows: dot products with an offset from the first corner are the barycentric weights of the other three.
+    /// The dot products of a point's offset from the first corner with these are its barycentric weights for the other three corners.
     weights: [DVec3; 3],
 }
 
@@ -55,9 +55,9 @@ pub struct Passage {
 pub enum Change {
     /// It rises above 0.
     Counts,
-    /// It returns to 0 or less, and was not negative at some earlier time in the same step.
+    /// It returns to 0 or less; at some earlier time in the same step it was at least 0.
     Returns,
-    /// It rises to 0 or less, and was negative since the step began.
+    /// It rises, but not above 0, and has been negative ever since the step began.
     Rises,
 }
 
@@ -184,7 +184,7 @@ struct Boxes {
     low: DVec3,
     edge: DVec3,
     size: [usize; 3],
-    /// The items that touch each box which contains a point.
+    /// For each box that contains a query point, the items that touch it; none for the other boxes.
     items: Lists<u32>,
 }
 
@@ -263,8 +263,8 @@ impl Passage {
         SAMPLES.iter().map(at)
     }
 
-    /// When the surface passes a point (0 to 1 within the step), if the point is inside: the sum of the weights of the later pose's
-    /// corners, which are the last one, two or three.
+    /// When the surface passes a point (0 to 1 within the step); none if the point is outside the tetrahedron. It is the sum of the
+    /// barycentric weights of the corners at the later pose: the last one, two or three, depending on the part.
     fn time(&self, p: &DVec3) -> Option<f64> {
         let offset = p - self.corners[0];
         let [u, v, w] = self.weights.map(|row| row.dot(&offset));

@@ -25,14 +25,15 @@ const BYTES_PER_VERTEX: u64 = 150;
 /// Maximum number of bytes added in one round, whatever the context allows.
 const MAX_BYTES: u64 = 8 << 30;
 
-/// Difference (cells) between the patch that an edge sweeps in a step and its two triangles.
+/// Difference (cells) between the patch that an edge sweeps in a step and the two triangles that replace it.
 pub fn edge_error([before, after]: [&[DVec3]; 2], [i, j]: [u32; 2]) -> f64 {
     let edge = |pose: &[DVec3]| pose[i as usize] - pose[j as usize];
     (edge(after) - edge(before)).norm() / 4.0
 }
 
-/// Splits edges into equal pieces until each error is within `tolerance` (cells), and extends the poses; none if no edge needs it. `wanted`
-/// returns whether an edge matters in a step, given its ends at both poses.
+/// Splits edges into equal pieces until each error is within `tolerance` (cells), and adds the new vertices to the poses; returns none if
+/// no
+/// edge is split. `wanted` returns whether an edge matters in a step, given the step's two poses.
 ///
 /// # Errors
 /// Cancel; more pieces than fit in memory.

@@ -82,7 +82,7 @@ impl Derived {
 /// Closed triangles, their unique edges, and the vertices that are added to the mesh's own.
 #[derive(Debug, Clone, Default)]
 pub struct Topology {
-    /// Vertices of the mesh itself.
+    /// Number of vertices of the mesh itself.
     pub own_vertices: usize,
     /// Vertices computed at each pose; the first has index `own_vertices`.
     pub derived: Vec<Derived>,
@@ -133,7 +133,7 @@ impl Topology {
         topology
     }
 
-    /// Own and derived vertices.
+    /// Number of own and derived vertices.
     pub fn vertex_count(&self) -> usize {
         self.own_vertices + self.derived.len()
     }
@@ -173,7 +173,7 @@ impl Topology {
 
     fn index_edges(&mut self) {
         const SIDES: [(usize, usize, u8); 3] = [(0, 1, 0), (1, 2, 1), (0, 2, 2)];
-        // By the lower vertex, then a short sort by the other: vertices have few neighbours.
+        // Listed by the lower vertex; each list is then sorted by the other, and is short, as vertices have few neighbours.
         let of_triangle = |(simplex, triangle): (&Simplex, u32)| {
             let v = simplex.v;
             SIDES.map(|(i, j, side)| (v[i], (v[j], Incidence { triangle, side })))

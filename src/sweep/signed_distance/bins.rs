@@ -126,7 +126,7 @@ impl Bins {
     }
 
     /// Winding numbers of the chain at a point (fixed-point units) and at `beside`, at most [`crate::sweep::chain::prism::BESIDE`] cells
-    /// from it: that of the nearest voxel, corrected by the faces in between.
+    /// from it: they are the winding number of the nearest voxel, corrected by the faces in between.
     pub fn windings(&self, point: Point, beside: Point, prisms: &mut Prisms) -> [i32; 2] {
         let voxel = voxel_of(point);
         let mut winding = self.lines.winding(voxel);

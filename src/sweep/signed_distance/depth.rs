@@ -123,7 +123,7 @@ impl Part {
         Self { v, triangle: Triangle::new(&v, corner), inner: Inner::Unknown }
     }
 
-    /// As [`Near::distance_of_open`]; `open` returns the open parts of a small part.
+    /// As [`NearFacets::distance_of_open`]; `open` returns the open parts of a small part.
     fn distance_of_open(
         &mut self,
         p: [f32; 3],
@@ -175,7 +175,7 @@ impl<'a> Candidates<'a> {
 }
 
 impl<'a, 'n> Depths<'a, 'n> {
-    /// Of one group.
+    /// The depths of one group.
     pub fn new(near: &'a NearFacets<'n>, group: &'a Group<'a>) -> Self {
         Self { near, group, candidates: [None, None] }
     }

@@ -309,7 +309,7 @@ impl Voxeliser {
     }
 }
 
-/// Marks the blocks within `reach` cells of faces for which `wanted` is true.
+/// Marks the blocks for which `wanted` is true, of those within `reach` cells of faces.
 fn mark_wanted(
     faces: &[Face],
     region: &Region,

@@ -1,10 +1,10 @@
 //! Turns closed parts of a mesh outward, in the same way for everything that takes meshes.
 //!
-//! A part is what edges connect, with vertices at the same position joined. Parts that are closed by their indices remain separate parts,
-//! whatever they touch. Doubled triangles count once. Triangles of a closed part that disagree on which side is out are made to agree.
-//! Closed parts whose outermost corners lie in no other part are turned outward, so that cavities stay cavities; a solid with cavities
-//! whose whole surface is inside out is turned together with them. A correct mesh is unchanged. Open sheets are unchanged too: which side
-//! is out is decided where they are used.
+//! A part is a set of triangles that edges connect, with vertices at the same position joined. Parts that are closed by their indices
+//! remain separate parts, whatever they touch. Doubled triangles count once. Triangles of a closed part that disagree on which side is out
+//! are made to agree. Closed parts whose outermost corners lie in no other part are turned outward, so that cavities stay cavities; a solid
+//! with cavities whose whole surface is inside out is turned together with them. A correct mesh is unchanged. Open sheets are unchanged
+//! too: which side is out is decided where they are used.
 
 mod nesting;
 mod outcome;

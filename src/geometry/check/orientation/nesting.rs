@@ -7,7 +7,7 @@ use crate::geometry::shape::bounds;
 use crate::geometry::spatial::bvh::Bvh;
 use crate::geometry::{DVec3, TriMesh, Vec3};
 
-/// Directions that no edges of modelled meshes follow: two of three decide.
+/// Directions of rays, which no edges of modelled meshes follow; two of the three must agree that a point is inside.
 pub(super) const ASLANT: [DVec3; 3] = [
     DVec3::new(0.5773, 0.6533, 0.4896),
     DVec3::new(-0.6123, 0.3871, 0.6894),
@@ -17,7 +17,7 @@ pub(super) const ASLANT: [DVec3; 3] = [
 const UP: DVec3 = DVec3::new(1.3e-5, 1.0, -0.7e-5);
 /// Points within this fraction of the overall size lie on a surface: 32-bit coordinates are that coarse.
 const ON_SURFACE: f64 = 1.0e-6;
-/// Triangles whose centres are tested if the outermost corners of a part all lie on others.
+/// Maximum number of a part's triangles whose centres are tested if its outermost corners all lie on other parts.
 const MIDDLES: usize = 16;
 
 /// A part of a mesh, as the space that it bounds.
@@ -30,7 +30,7 @@ pub(super) struct Shape {
     pub(super) volume: f64,
     /// Whether it may be turned; if not, it can only contain parts.
     pub(super) can_turn: bool,
-    /// An open sheet with all below its upward-facing triangles solid; its volume means nothing.
+    /// Whether it is an open sheet below whose upward-facing triangles everything is solid; its volume then means nothing.
     pub(super) is_bottomless: bool,
 }
 
@@ -93,8 +93,8 @@ pub(super) fn turns(shapes: &[Shape]) -> Turns {
         }
         let has = |parts: &[u32], sign: i32| parts.iter().any(|other| signs[*other as usize] == sign);
         let [has_solid, has_cavity] = [1, -1].map(|sign| has(&children[at], sign));
-        // Turn it with everything in it if that faces the other way: a solid whose whole surface is inside out. Otherwise inside-out parts
-        // within it are already cavities.
+        // If the parts directly within it face the other way, turn it with everything in it: it is a solid whose whole surface is inside
+        // out. Otherwise inside-out parts within it are already cavities.
         let as_a_whole = has_solid && !has_cavity;
         let is_clear = as_a_whole || below.is_empty() || (!has_solid && has(&below, 1));
         out.ambiguous += usize::from(!is_clear);

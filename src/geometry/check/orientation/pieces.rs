@@ -11,12 +11,12 @@ use crate::geometry::shape::{bounds, normal, six_volumes};
 use crate::geometry::spatial::bvh::Bvh;
 use crate::geometry::{DVec3, TriMesh};
 
-/// Volumes of parts up to this many cubes of their size count as 0: rounding produces as much.
+/// The volume of a part counts as 0 if it is at most this fraction of the cube of the part's size: rounding alone can produce as much.
 const ROUNDING: f64 = 1e-12;
 /// An open part counts as closed if its caps have at most this share of its area.
 const CAPS: f64 = 0.05;
 
-/// The triangles that count, by part.
+/// The triangles of a mesh that are not left out, and their parts.
 #[derive(Default)]
 pub(super) struct Pieces<'a> {
     positions: &'a [DVec3],
@@ -158,7 +158,8 @@ impl<'a> Pieces<'a> {
         }
     }
 
-    /// Counts the patches of closed remainders that have a negative winding number on a side: parts of those remainders are inside out.
+    /// Of the patches that make up closed remainders, counts those with a negative winding number on either side: there, a part of the
+    /// remainder is inside out.
     fn count_inverted(&self, left: &[u32], patch: &[u32]) -> usize {
         let mut order: Vec<u32> = left.to_vec();
         order.sort_by_key(|at| self.part[*at as usize]);
@@ -185,8 +186,8 @@ impl<'a> Pieces<'a> {
         found
     }
 
-    /// Turns open parts up, or so that they bound a volume, if their own orientation is ambiguous: two-sided sheets, and parts whose
-    /// neighbours disagreed.
+    /// Turns open parts whose own orientation is ambiguous (two-sided sheets, and parts in which neighbouring triangles disagreed) so that
+    /// they face up (`Below`) or their volume is positive (`Caps`).
     fn face_up(&mut self, agreement: &Agreement, two_sided: &[u32], closing: Closing, out: &mut Orientation) {
         let count = self.named.len();
         let mut is_undecided = vec![false; count];
