@@ -1,9 +1,9 @@
 //! Scene files (TOML) describe a shot. They are read with every default filled in ([`Scene::read`], `schema/`, `systems/`), checked
 //! against their inputs, and run frame by frame.
 //!
-//! [`run`] runs any stage. [`snow`], [`surface`] and [`shallow`] have the inputs, the check and the stages of a system. The stage `objects`
-//! writes the objects as they move. A new stage is a type with the traits [`run::Stage`] and [`run::Stepping`] beside its system, listed in
-//! the system's pipeline ([`snow::pipeline`]) and in the scopes of the keys that it depends on.
+//! [`run`] runs any stage. [`snow`], [`surface`] and [`shallow`] each have the inputs, the check and the stages of one system. The stage
+//! `objects` writes the objects as they move. A new stage is a type with the traits [`run::Stage`] and [`run::Stepping`] in its system's
+//! folder, listed in the system's pipeline ([`snow::pipeline`]) and in the scopes of the keys that it depends on.
 //!
 //! # Glossary
 //!
@@ -14,7 +14,7 @@
 //! | upstream | the stages whose frames a stage reads |
 //! | pass | a stage's loop over the frames to be made |
 //! | record | the manifest of a frame's files, written last: a frame is done when it exists |
-//! | settings | the values that a stage depends on; if one changes, its frames are made again |
+//! | settings | the values that a stage depends on; if one changes, the stage's frames must be made again |
 //! | state | the exact data that a pass resumes from: a stage's own files, or bytes in `state/` |
 
 mod moving;
@@ -45,8 +45,7 @@ use crate::motion::Space;
 use crate::snow::NoiseParams;
 use std::path::{Path, PathBuf};
 
-/// A scene with every default filled in and every path absolute. Immutable after parsing: what a stage reads, and the settings that
-/// identify its frames, follow from its text alone.
+/// A scene with every default filled in and every path absolute. After parsing, only [`Scene::coarsen`] changes it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
     pub(crate) path: PathBuf,
@@ -61,7 +60,7 @@ pub struct Scene {
     pub(crate) values: Values,
 }
 
-/// The subject of a scene: the system that makes it, named by the scene's table.
+/// The system that makes a scene's frames: the one whose table the scene has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum System {
     /// `[snow]`: objects move through a deep layer of snow.
@@ -124,7 +123,7 @@ pub struct Snow {
     pub cell: f64,
     /// Raggedness of cut edges; an amplitude of 0 switches it off.
     pub noise: NoiseParams,
-    /// Islands of fewer voxels are removed, 0..=10,000; 0: none.
+    /// Islands of fewer voxels than this are removed (0..=10,000); 0: none are.
     pub min_crumb: usize,
 }
 
@@ -135,7 +134,7 @@ pub enum Ground {
     Plane {
         /// Its y (m).
         height: f64,
-        /// Minimum and maximum x and z of the layer: `[x0, z0, x1, z1]` (m); `None` beside a .vdb layer.
+        /// Minimum and maximum x and z of the layer: `[x0, z0, x1, z1]` (m); `None` if the layer is a .vdb file.
         area: Option<[f64; 4]>,
     },
     /// A mesh file.
@@ -156,7 +155,7 @@ pub enum Layer {
 /// One object of the scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Object {
-    /// A glTF character, a mesh file, or the pattern of a sequence of them (`body.%04d.obj`).
+    /// A glTF character, a mesh file, or the pattern of a sequence of mesh files (`body.%04d.obj`).
     pub file: PathBuf,
     /// For a character: only the nodes of this name (`*` matches any characters, `?` exactly one) and their descendants.
     pub node: Option<String>,
@@ -164,7 +163,7 @@ pub struct Object {
     pub clip: Option<String>,
     /// Whether the clip starts again when it ends.
     pub repeat: bool,
-    /// Frames by which its sequence or its clip starts later; without offset a clip starts at the shot's first frame.
+    /// Frames by which its sequence or clip starts later; with 0 a clip starts at the shot's first frame.
     pub offset: f64,
     /// The file's unit and upward axis.
     pub space: Space,
@@ -172,13 +171,13 @@ pub struct Object {
     pub role: Role,
     /// Whether its cuts have ragged edges.
     pub noise: bool,
-    /// Rigid motion on top of the file's own, by ascending frames; may be empty.
+    /// Poses of a rigid motion on top of the file's own, ascending by frame; may be empty.
     pub keys: Vec<KeyPose>,
     /// Whether the motion between keys is eased: see [`crate::motion::Keys::with_ease`].
     pub ease: bool,
 }
 
-/// A rigid pose at a frame; linear in between (or eased), constant before the first and after the last.
+/// A rigid pose at a frame. Motion is linear (or eased) between poses; there is none before the first and after the last.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct KeyPose {
     /// Frame of the shot.
@@ -419,7 +418,7 @@ impl Output {
         self.inexact_base().is_none()
     }
 
-    /// The key because of which the base's files lack its exact values, if there is one.
+    /// The key that keeps exact values out of the base's files, if one does.
     pub(crate) fn inexact_base(&self) -> Option<&'static str> {
         match self {
             Self { half: true, .. } => Some("half"),

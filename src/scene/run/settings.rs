@@ -27,7 +27,7 @@ pub(in crate::scene) fn changed(before: &Settings, after: &Settings) -> Vec<Stri
         (Some(value), key) if key == "shot.frames" => format!("{key} began at {value}"),
         (Some(value), key) if value.len() > MAX_LENGTH => key,
         (Some(value), key) => format!("{key} was {value}"),
-        (None, key) => format!("{key} was not there"),
+        (None, key) => format!("{key} was not set"),
     };
     keys.iter().filter(differs).map(|key| described(key)).collect()
 }

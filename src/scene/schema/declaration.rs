@@ -5,11 +5,11 @@
 pub enum Scope {
     /// The state before the first frame, and everything after it.
     First,
-    /// Every step; for a key of an object, only if it moves.
+    /// Every step; for a key of an object, only if the object moves.
     Step,
     /// The files of a frame.
     Output,
-    /// By its object's role: the first state for a static one, every step for one that moves.
+    /// For a key of an object: the first state if the object is static, every step if it moves.
     Object,
 }
 
@@ -55,7 +55,7 @@ pub enum Fallback {
     Nothing,
     /// A value, in TOML.
     Is(&'static str),
-    /// A number of cells (m).
+    /// A length (m), given as a number of cells.
     Cells(f64),
 }
 
@@ -122,7 +122,7 @@ pub struct Key {
     pub kind: Kind,
     /// Its default.
     pub fallback: Fallback,
-    /// Presets with their defaults, in TOML: one replaces `fallback` if the table's `preset`, or `liquid`, names it.
+    /// Presets with their defaults, in TOML: that of the preset which the table's `preset`, or `liquid`, names replaces `fallback`.
     pub presets: &'static [(&'static str, &'static str)],
     /// Its line in a starter scene.
     pub example: Example,

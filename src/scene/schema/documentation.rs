@@ -18,8 +18,8 @@ pub fn template_of([title, name]: [&str; 2], keys: &[Key]) -> String {
         let keys_of = || keys.iter().filter(|key| key.table == table);
         let is_shown = keys_of().any(|key| key.example.is_shown);
         let note = match table {
-            _ if is_table_array(table) => "  # as many as there are",
-            _ if shared_keys::OPTIONAL_TABLES.contains(&table) => "  # only with this line are there any",
+            _ if is_table_array(table) => "  # any number of them",
+            _ if shared_keys::OPTIONAL_TABLES.contains(&table) => "  # none without this line",
             _ => "",
         };
         let _ = writeln!(out, "\n{}{}{note}", if is_shown { "" } else { "# " }, heading(table));
@@ -64,7 +64,7 @@ fn default_in_cells(key: &Key) -> String {
 pub fn reference_of(keys: &[Key]) -> String {
     let mut out = String::new();
     for table in tables(keys) {
-        let many = if is_table_array(table) { ", as many as there are" } else { "" };
+        let many = if is_table_array(table) { ", any number of them" } else { "" };
         let _ = write!(out, "\n`{}`{many}\n\n", heading(table));
         out.push_str("| key | holds | default | meaning |\n|---|---|---|---|\n");
         for key in keys.iter().filter(|key| key.table == table) {

@@ -96,7 +96,7 @@ impl FrameChoice {
         self.frames.binary_search(&frame).is_ok()
     }
 
-    /// No frames: without a first and a last one.
+    /// No frames: [`FrameChoice::first`] and [`FrameChoice::last`] must not be called.
     pub(in crate::scene) fn none() -> Self {
         Self { frames: Vec::new() }
     }

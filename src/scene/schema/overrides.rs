@@ -35,7 +35,7 @@ impl Override {
         &self.text
     }
 
-    /// Puts the value into a document, at the offset that errors refer to.
+    /// Puts the value into a document; `offset` stands for the setting in errors.
     pub(in crate::scene) fn apply<'i>(
         &'i self,
         root: &mut DeTable<'i>,

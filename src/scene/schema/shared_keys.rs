@@ -57,7 +57,7 @@ pub const OBJECTS: &[Key] = &[
         .means("character, mesh, or sequence \"body.%04d.obj\""),
     key(OBJECT_SCOPES, OBJECT, "node", Text, optional("\"hero*\""))
         .of_characters()
-        .means("only nodes of this name (* matches any letters) and their descendants"),
+        .means("only nodes of this name (* matches any characters) and their descendants"),
     key(OBJECT_SCOPES, OBJECT, "clip", Text, optional("\"Walk\""))
         .of_characters()
         .means("required if there are several; \"\": the rest pose"),

@@ -1,6 +1,6 @@
 //! Tables of a TOML file, read key by key, so that every error names the file, the line and the key.
 //!
-//! serde's own errors name neither the table nor the nearest key, and are of no use for a key that may be a number or a text.
+//! serde's own errors name neither the table nor the nearest key, and do not help with a key that may be a number or a text.
 
 use super::overrides::Override;
 use crate::error::{Error, Result};
@@ -39,7 +39,8 @@ impl Document<'_> {
         self.overrides.get(offset.checked_sub(self.text.len() + 1)?)
     }
 
-    /// The absolute path of a file named at an offset: relative to the scene's folder, or for the command line to the current one.
+    /// The absolute path of a file named at an offset: relative to the scene's folder or, if it comes from the
+    /// command line, to the current one.
     fn path_at(&self, offset: usize, name: &str) -> PathBuf {
         match self.override_at(offset) {
             Some(_) => std::path::absolute(name).unwrap_or_else(|_| name.into()),

@@ -103,7 +103,7 @@ impl<'v> TableValues<'v> {
         self.values.find(self.index, self.table, name)
     }
 
-    /// The value of a key that is required or has a default, which its declaration provides for a table that the scene leaves out.
+    /// The value of a key that is required or has a default; if the scene leaves the table out, the declared default.
     ///
     /// # Panics
     /// A key that is not declared, has no default or has another type: a programming error, whatever the scene.
@@ -134,7 +134,7 @@ impl<'v> TableValues<'v> {
     }
 }
 
-/// A key's path in settings: `snow.noise.size`, `object[1].scale`; `index` is from 0.
+/// A key's path in settings: `snow.noise.size`, `object[1].scale`; `index` counts from 0.
 pub fn key_path(key: &Key, index: Option<usize>) -> String {
     match index {
         None => format!("{}.{}", key.table, key.name),
@@ -405,7 +405,7 @@ fn poses(name: &str, object: &Table, limit: f64) -> Result<Vec<KeyPose>> {
         let frame = table.number_in("frame", -1.0e8..=1.0e8, "")?;
         let frame = frame.ok_or_else(|| table.error("frame", "is missing"))?;
         if poses.last().is_some_and(|before| before.frame >= frame) {
-            return Err(table.error("frame", "must be greater than the key's before it"));
+            return Err(table.error("frame", "must be greater than that of the key before it"));
         }
         let triple = |name: &str, limit: f64, what: &str| -> Result<[f64; 3]> {
             let numbers = table.numbers(name, 3)?.unwrap_or_else(|| vec![0.0; 3]);

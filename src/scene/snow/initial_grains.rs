@@ -68,7 +68,7 @@ impl InitialGrains {
         };
         let velocities = match values("v") {
             Some(Values::Vector(column)) => (0..positions.len()).map(|index| column.get(index)).collect(),
-            Some(_) => return Err(Error::file(path, "has an attribute v that is no vector")),
+            Some(_) => return Err(Error::file(path, "has an attribute v that is not a vector")),
             None => Vec::new(),
         };
         let params = params(scene, cell);

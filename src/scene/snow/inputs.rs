@@ -60,7 +60,7 @@ enum GroundBelow {
 }
 
 impl Inputs {
-    /// Reads every input; for sequences the first frame, after checking that none is missing.
+    /// Reads every input; of sequences the first frame, after checking that no frame is missing.
     ///
     /// # Errors
     /// Errors in files or keys, with file and key.
@@ -139,7 +139,7 @@ impl Inputs {
         }
     }
 
-    /// Maximum height of the snow (m), if known before it is made; without static objects.
+    /// Maximum height of the snow (m), if known before it is made; with a depth, also of the snow on static objects.
     pub fn top(&self) -> Option<f64> {
         let highest = |mesh: &TriMesh| mesh.bounds().map(|(_, high)| f64::from(high.y));
         match (&self.source, &self.snow.layer) {
@@ -277,7 +277,7 @@ fn object_name(index: usize, object: &Object) -> String {
     format!("object {} ({})", index + 1, schema::file_name(&object.file))
 }
 
-/// A mesh with its closed parts outward; adds warnings about what remains ambiguous.
+/// A mesh with its closed parts turned outward; adds warnings about what remains ambiguous.
 fn oriented(mesh: TriMesh, name: &str, warnings: &mut Vec<String>) -> TriMesh {
     let orientation = Orientation::of_mesh(&mesh, Closing::Caps);
     warnings.extend(orientation.warning().map(|what| format!("{name}: {what}")));
@@ -346,7 +346,7 @@ fn layer_grid(path: &Path, cell: f64, input_hashes: &InputHashes) -> Result<Floa
     Ok(grid)
 }
 
-/// An object's motion: its file, its own frames, scale and axis, with the keys on top.
+/// An object's motion: that of its file, shifted by its offset and converted to metres and Y up, with the keys on top.
 fn motion(
     scene: &Scene,
     object: &Object,
@@ -419,7 +419,7 @@ fn character(scene: &Scene, object: &Object, input_hashes: &InputHashes) -> Resu
     Ok(character)
 }
 
-/// A motion's mesh at a time (s), with the vertices of a corner moved to one position, and a warning about ambiguous ones.
+/// A motion's mesh at a time (s), with the vertices of a corner moved to one position, and a warning about ambiguous corners.
 fn posed(motion: &dyn Motion, time: f64) -> Result<(TriMesh, Option<String>)> {
     let mut pose = Vec::new();
     motion.pose_as_read(time, &mut pose)?;

@@ -25,6 +25,6 @@ pub(in crate::scene::snow) fn wind(path: &Path) -> Result<VectorGrid> {
     })?;
     match file::read_any(path, Some(&name))? {
         AnyGrid::Vectors(grid) => Ok(grid),
-        AnyGrid::Floats(_) => Err(Error::file(path, format!("grid \"{name}\" is not one of vectors"))),
+        AnyGrid::Floats(_) => Err(Error::file(path, format!("grid \"{name}\" does not hold vectors"))),
     }
 }

@@ -22,7 +22,8 @@ impl Scene {
         Self::read_with(path, &[])
     }
 
-    /// Reads a scene file with settings of the command line overriding its own; relative paths in those start from the current folder.
+    /// Reads a scene file with settings of the command line overriding its own; relative paths in these settings start from the current
+    /// folder.
     ///
     /// # Errors
     /// As [`Scene::read`].
@@ -40,7 +41,7 @@ impl Scene {
         Self::parse_keys(text, path, overrides, super::keys::of)
     }
 
-    /// The same with another list of keys.
+    /// As [`Scene::parse`], with another list of keys.
     pub(in crate::scene) fn parse_keys(
         text: &str,
         path: &Path,
@@ -116,8 +117,8 @@ impl System {
     }
 }
 
-/// Reads a table and the tables in it, or an array of tables. Of missing tables only `[shot]` is an error here: the caller looks for the
-/// system's own.
+/// Reads a table and the tables in it, or an array of tables. Among missing tables only `[shot]` is an error here: the caller checks for
+/// the system's own table.
 fn read_table<'d>(
     document: &'d Document<'d>,
     root: &Table<'d, '_>,

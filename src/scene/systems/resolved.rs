@@ -27,8 +27,8 @@ impl Scene {
         out
     }
 
-    /// The same for a file in `folder`, with relative paths where the whole may be moved: if `folder` lies in the scene's own folder, to files
-    /// in the scene's folder; if it is a sibling of the scene's folder, also to files in their common parent. All other paths are absolute.
+    /// As [`Scene::to_toml`], for a file in `folder`, with relative paths so that both folders can be moved together: if `folder` lies in the
+    /// scene's folder, to files in the scene's folder; if it is a sibling of that, also to files in their parent. All others are absolute.
     pub fn to_toml_in(&self, folder: &Path) -> String {
         let mut scene = self.clone();
         let home = self.path.parent().filter(|home| !home.as_os_str().is_empty()).unwrap_or(Path::new("."));

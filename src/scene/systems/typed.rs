@@ -68,7 +68,7 @@ impl Output {
     /// Checks the keys in combination.
     ///
     /// # Errors
-    /// 16-bit values where changes are stored, which must be exact.
+    /// A key that leaves out what another stage reads; 16-bit values where changes are stored, which must be exact.
     pub(in crate::scene) fn check(table: &Table, values: &Values) -> Result<()> {
         let output = Self::of(values);
         if snow::has_grains(values)

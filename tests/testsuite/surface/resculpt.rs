@@ -224,7 +224,7 @@ fn a_sculpt_that_changes_comes_or_goes_is_noticed() {
     // A shot that is done has none yet.
     works(folder, &format!("{SHOT} -o out"));
     write_sculpt(folder, 3, edited(3, BUMP), Vec::new());
-    fails(folder, &format!("{shot} -o out"), 2, &["surface.resculpt was not there", "--from N"]);
+    fails(folder, &format!("{shot} -o out"), 2, &["surface.resculpt was not set", "--from N"]);
     works(folder, &format!("{shot} -o out --from 3"));
     works(folder, &format!("{shot} -o fresh"));
     are_same(&output(&folder.join("fresh")), &folder.join("out"), is_no_record);

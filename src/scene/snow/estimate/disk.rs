@@ -9,16 +9,16 @@ use crate::scene::{BaseMode, Scene};
 /// Bytes of a whole base file for each column of cells; bytes of a frame's changes and removed snow.
 const BYTES_PER_COLUMN: f64 = 20.0;
 const BYTES_PER_CHANGE: f64 = 4e5;
-/// Bytes of a whole base file for each leaf: two surfaces cross 3.2 leaves of 64 columns.
+/// Bytes of a whole base file for each leaf: over 64 columns, the two surfaces cross 3.2 leaves.
 const BYTES_PER_LEAF: f64 = BYTES_PER_COLUMN * 64.0 / 3.2;
 /// Bytes for each vertex of an object in a .usda and a .ply file.
 const USDA_PER_VERTEX: f64 = 110.0;
 const PLY_PER_VERTEX: f64 = 50.0;
-/// Bytes of a pair of texture coordinates, and of a corner's index of one.
+/// Bytes of a pair of texture coordinates and of a corner's index of a pair in a .usda file, and of a pair in a .ply file.
 const USDA_PER_POSITION: f64 = 20.0;
 const USDA_PER_INDEX: f64 = 7.0;
 const PLY_PER_POSITION: f64 = 8.0;
-/// Bytes of a grain in each kind of file, and in a packed state; for files of changes measured while a character walks.
+/// Bytes of a grain in each kind of file, and in a packed state; that for files of changes was measured while a character walks.
 const GRAIN_VDB: f64 = 49.0;
 const GRAIN_CHANGES: f64 = 28.0;
 const GRAIN_PLY: f64 = 50.0;

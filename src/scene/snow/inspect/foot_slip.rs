@@ -24,7 +24,7 @@ pub struct FootSlip {
     pub standing: f64,
     /// Speed (m/s) at which standing feet slip with the scene's keys.
     pub slips_m_per_s: f64,
-    /// Keys without slip, straight on from the scene's first key.
+    /// Keys that cause no slip: straight ahead from the scene's first key.
     pub keys: String,
     /// Whether the feet slip enough to report.
     pub slips: bool,

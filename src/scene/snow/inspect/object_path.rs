@@ -116,7 +116,8 @@ impl<'a> ObjectPath<'a> {
         self.extents.iter().fold((first.low, first.high), |(l, h), e| (l.inf(&e.low), h.sup(&e.high)))
     }
 
-    /// First and last frame at which its bounds overlap those of the snow; those of the shot if the snow's are unknown.
+    /// First and last frame at which its bounds overlap those of the snow; the shot's first and last frame if the snow's
+    /// bounds are unknown.
     fn touches(&self) -> Option<[i32; 2]> {
         let snow = self.inputs.area().zip(self.inputs.top());
         let touching = |extent: &&Extent| match snow {
@@ -198,8 +199,8 @@ impl<'a> ObjectPath<'a> {
     fn jumping(&self, report: &ObjectReport) -> Option<String> {
         (report.fastest_m_per_s > FASTEST_OBJECT).then(|| {
             format!(
-                "{} moves at {:.0} m/s in the step to frame {}: if that is a jump, it still cuts the snow on its way; grains \
-                 take it as standing at its new place from the step's start",
+                "{} moves at {:.0} m/s in the step to frame {}: if that is a jump, it still cuts the snow on its way, but for \
+                 grains it stands at its new position from the step's start",
                 self.name, report.fastest_m_per_s, report.fastest_frame
             )
         })
@@ -266,7 +267,7 @@ fn extents(ctx: &Context, scene: &Scene, body: &Body) -> Result<Vec<Extent>> {
     let frames: Vec<i32> = scene.shot.frames.iter().collect();
     let of_batch = |batch: &[i32]| -> Result<Vec<Extent>> {
         let at = |frame: i32| scene.shot.time(frame);
-        // The first frame of a run is compared with the frame before it, if the shot has one.
+        // The first frame of a batch is compared with the frame before it, if the shot has one.
         let mut time = at((batch[0] - 1).max(scene.shot.frames.first));
         let mut poses = Poses::start(body.motion(), time)?;
         let mut lengths = vec![0.0; body.motion().vertex_count()];
@@ -305,7 +306,7 @@ fn sample_times(motion: &dyn Motion, from: f64, to: f64) -> Vec<f64> {
     out
 }
 
-/// The scale factor that makes an implausible size (m) plausible, as of a file in centimetres or millimetres.
+/// The scale factor that makes an implausible size (m) plausible, as for a file in centimetres or millimetres.
 fn likely_scale(size: f64) -> Option<f64> {
     let plausible = |factor: f64| (0.3..=5.0).contains(&(size * factor));
     match size {
@@ -353,7 +354,7 @@ pub struct ObjectReport {
     pub fastest_frame: i32,
     /// First and last frame at which its bounds touch the snow's.
     pub touches: Option<[i32; 2]>,
-    /// Its depth, if the ground is known and the object comes over it.
+    /// Its lowest position, if the ground is known and the object passes over it.
     pub deepest: Option<Deepest>,
     /// The speed that its clip requires of its keys, and the slip of its feet.
     pub walk: Option<FootSlip>,

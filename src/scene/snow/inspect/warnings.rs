@@ -37,7 +37,7 @@ pub(in crate::scene::snow) fn too_small(
     let (size, diameter) = ((high - low).max(), 2.0 * radius);
     Ok((size < diameter).then(|| {
         format!(
-            "{} is {} m large, smaller than a grain of {} m: what it takes makes no grains; choose a smaller grains.radius",
+            "{} is {} m large, smaller than a grain of {} m: the snow that it removes makes no grains; choose a smaller grains.radius",
             body.name().unwrap_or("an object"),
             rounded(size),
             rounded(diameter)

@@ -24,7 +24,7 @@ const STEP: Scopes = &[("base", Scope::Step)];
 /// The keys of snow.
 pub const KEYS: &[Key] = &[
     key(GROUND, "snow", "ground", HeightOrFile(FAR, &EXTENSIONS), optional("0.0").shown()).means(
-        "height of a level plane (m), or a mesh (then no area); beside a .vdb layer only grains lie on it",
+        "height of a level plane (m), or a mesh (then no area); if the layer is a .vdb file, only grains lie on it",
     ),
     key(GROUND, "snow", "area", Numbers(4, FAR, "m"), optional("[-3.0, -3.0, 3.0, 3.0]").shown())
         .means("extent of the plane: x0, z0, x1, z1 (m)"),
@@ -68,7 +68,7 @@ impl Snow {
     /// Checks the keys in combination.
     ///
     /// # Errors
-    /// Keys that exclude each other, or a key without one that it needs; noise that would leave islands.
+    /// Keys that exclude each other, or a key without one that it needs; a plane of no area.
     pub(in crate::scene) fn check(table: &Table, values: &Values) -> Result<()> {
         let snow = values.table("snow");
         let (ground, top) = (snow.value("ground"), snow.value("top"));
@@ -84,11 +84,11 @@ impl Snow {
         }
         match (ground, snow.value("area")) {
             (_, Some(_)) if is_grid => {
-                return Err(table.error("area", "is of no use beside a .vdb layer in `top`: leave it out"));
+                return Err(table.error("area", "is not used if `top` is a .vdb file: leave it out"));
             }
             (None, Some(_)) => return Err(table.error("area", "needs `ground`, the height of a plane")),
             (Some(Value::File(_)), Some(_)) => {
-                return Err(table.error("area", "is of no use beside a mesh in `ground`: leave it out"));
+                return Err(table.error("area", "is not used if `ground` is a mesh: leave it out"));
             }
             (Some(Value::Number(_)), None) if !is_grid => {
                 return Err(table.error("area", "is missing: a plane needs [x0, z0, x1, z1] (m)"));
@@ -118,7 +118,7 @@ impl Snow {
             return Ok(());
         }
         let what = format!(
-            "is too steep, {} m over {} m, and would leave islands: an amplitude of at most {max_amplitude:.4} m goes with this size",
+            "is too steep, {} m over {} m, and would leave islands: with this size, the amplitude may be at most {max_amplitude:.4} m",
             noise.amplitude, noise.size
         );
         Err(table.error(if table.has("amplitude") { "amplitude" } else { "size" }, what))

@@ -71,7 +71,7 @@ impl Stage for Base<'_> {
     }
 
     fn why_states_are_missing(&self) -> &'static str {
-        "`half` and `base = []` keep those of the last two frames"
+        "`half` and `base = []` keep only those of the last two frames"
     }
 
     fn kinds(&self) -> &'static [FileKind] {

@@ -44,7 +44,8 @@ pub struct LayerReader {
 }
 
 impl LayerReader {
-    /// The layer after a frame. Frames in ascending order cost one file each; skipped frames that store changes are read too.
+    /// The layer after a frame. If frames ascend from call to call, each call reads the frame's file, and those of skipped frames that it
+    /// builds on.
     ///
     /// # Errors
     /// As [`layer_at`].

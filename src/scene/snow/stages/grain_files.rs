@@ -67,7 +67,7 @@ pub(in crate::scene::snow) fn ordered(mut points: Points) -> Points {
     points
 }
 
-/// Points whose attributes are either uniform in every frame or never, as the clips of a USD stage require.
+/// Points whose attributes are each uniform either in every frame or in none, as the clips of a USD stage require.
 pub(in crate::scene::snow) fn for_clips(mut points: Points) -> Points {
     if points.attribute(TRAPPED) == Some(&NONE_TRAPPED) {
         points.set(TRAPPED, Values::Bool(Column::Each(vec![false; points.count()])));
@@ -151,8 +151,8 @@ fn changes(before: &Points, after: &Points) -> (Points, Vec<i64>) {
     (changed, gone)
 }
 
-/// Sets the attributes of birth of points that existed before, at the given indices in `before`: to their values there or, without
-/// `before`, to 0, which compresses well.
+/// Sets the attributes of birth of the points that have an index in `old_indices`, as they existed in the previous frame: to their values
+/// in `before` or, without it, to 0, which compresses well.
 fn set_birth_attributes(points: &mut Points, before: Option<&Points>, old_indices: &[Option<usize>]) {
     fn values_at_birth<T: Copy + Default>(
         current: &Column<T>,
@@ -224,13 +224,13 @@ fn apply_changes(mut points: Points, mut changed: Points, gone: &[Run]) -> Resul
             }
             _ => {
                 let run = runs_to_text(std::slice::from_ref(run));
-                return Err(Error::argument(format!("names grains as gone ({run}) that were not there")));
+                return Err(Error::argument(format!("names grains as gone ({run}) that did not exist")));
             }
         }
     }
     for old_index in old_indices.iter().flatten() {
         if !std::mem::take(&mut stays[*old_index]) {
-            return Err(Error::argument(format!("names grain {} as gone, and holds it", old[*old_index])));
+            return Err(Error::argument(format!("names grain {} as gone, but holds it", old[*old_index])));
         }
     }
     let kept: Vec<u32> = (0..old.len() as u32).filter(|point| stays[*point as usize]).collect();
@@ -281,7 +281,7 @@ fn runs_to_text(runs: &[Run]) -> String {
     runs.iter().map(run).collect::<Vec<_>>().join(",")
 }
 
-/// Reverses [`runs_to_text`]. The result stays runs: a short string may stand for four billion numbers.
+/// Reverses [`runs_to_text`]. Runs are not expanded: a short string may stand for four billion numbers.
 fn runs_from_text(text: &str) -> Option<Vec<Run>> {
     let mut out: Vec<Run> = Vec::new();
     for run in text.split(',').filter(|run| !run.is_empty()) {
@@ -319,7 +319,7 @@ impl RebuildGrains {
     }
 
     /// The bytes of a frame's file as `grains_mode = "full"` writes it, except for the hash of the settings in its metadata.
-    /// Frames in ascending order cost one file each.
+    /// If frames ascend from call to call, none is read twice.
     ///
     /// # Errors
     /// A frame that does not exist; a file that was changed since it was written; cancel.
@@ -330,7 +330,7 @@ impl RebuildGrains {
         points::to_bytes(ctx, NAME, points, &WriteOptions { metadata, ..options.clone() })
     }
 
-    /// The grains after a frame, sorted by identity. Frames in ascending order cost one file each.
+    /// The grains after a frame, sorted by identity. If frames ascend from call to call, none is read twice.
     ///
     /// # Errors
     /// As [`RebuildGrains::bytes`].
@@ -349,7 +349,8 @@ pub(in crate::scene::snow) struct GrainReader {
 type Metadata = Vec<(String, MetaValue)>;
 
 impl GrainReader {
-    /// The grains after a frame, sorted by identity, with the metadata of its file. Frames in ascending order cost one file each.
+    /// The grains after a frame, sorted by identity, with the metadata of its file. If frames ascend from call to call, none is read
+    /// twice.
     ///
     /// # Errors
     /// A frame that does not exist; a file that was changed since it was written; cancel.

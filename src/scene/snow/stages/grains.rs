@@ -55,7 +55,7 @@ impl<'a> StaticGeometry<'a> {
 /// State carried from frame to frame.
 pub struct State {
     grains: grains::Grains,
-    /// The last frame, and the base layer after it.
+    /// The previous frame, and the base layer after it.
     layer: Option<(i32, Grids)>,
     /// Whether the warning about grains that fell past the edge of the ground was logged.
     has_warned: bool,
@@ -162,7 +162,7 @@ impl<'a> Grains<'a> {
         if report.fell > 0 && !std::mem::replace(&mut state.has_warned, true) {
             log::warn!(
                 "frame {frame}: {} grains fell past the edge of the ground to {FALL_DEPTH} m below it and are dropped, as are all that follow \
-                 them (`fell` in the reports): larger ground keeps them",
+                 them (`fell` in the reports): a larger ground keeps them",
                 report.fell
             );
         }

@@ -105,7 +105,7 @@ impl Mist<'_> {
             return Ok(StepReport::default());
         }
         let State { mist, statics, layer, .. } = state;
-        // The layer before the frame: snow that objects remove in it bounds the air until they reach it, see `Surroundings`.
+        // The layer before the frame: snow that objects remove during the frame bounds the air until they reach it, see `Surroundings`.
         let layer = layer.after(ctx, base, frame - 1)?;
         let moving = self.scene.objects.iter().filter(|object| object.role.moves());
         let pushing = self.inputs.bodies.iter().zip(moving).filter(|(_, object)| object.role.pushes());
@@ -264,7 +264,7 @@ impl Stepping for Mist<'_> {
     }
 
     fn step(&self, ctx: &Context, state: &mut State, to: &StepTarget<'_>) -> Result<Stepped<Self::Step>> {
-        // Before the first frame nothing moves.
+        // At the first frame nothing has moved yet.
         let report = match to.frame == self.scene.shot.frames.first {
             true => StepReport::default(),
             false => self.move_mist(ctx, state, to)?,

@@ -28,7 +28,8 @@ impl Rebuild {
         &self.stored
     }
 
-    /// The layer after a frame. Frames in ascending order cost one file each; skipped frames that store changes are read too.
+    /// The layer after a frame. If frames ascend from call to call, each call reads the frame's file, and those of skipped frames that it
+    /// builds on.
     ///
     /// # Errors
     /// A missing frame; a file that is not what was written.

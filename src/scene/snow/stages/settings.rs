@@ -94,7 +94,7 @@ mod tests {
         assert_eq!(changed(&rock("1.0"), &later), Vec::<String>::new());
         assert_eq!(changed(&rock("1.0"), &rock("2.0")), ["static object 1: scale was 1.0"]);
         assert_eq!(changed(&rock("1.0"), &none), ["static object 1: scale was 1.0"]);
-        assert_eq!(changed(&none, &rock("1.0")), ["static object 1: scale was not there"]);
+        assert_eq!(changed(&none, &rock("1.0")), ["static object 1: scale was not set"]);
     }
 
     #[test]

@@ -50,8 +50,8 @@ struct Source<'s> {
     mist: Option<FloatGrid>,
 }
 
-/// Files of a frame: kinds, extensions and contents. Grids are packed while they wait for the writer: those of several frames would take
-/// too much memory.
+/// Files of a frame: kinds, extensions and contents. Grids are packed while they wait for the writer: unpacked, those of several frames
+/// would take too much memory.
 type Files = Vec<(&'static str, &'static str, Vec<u8>)>;
 
 /// Name of the mesh's prim.
