@@ -76,7 +76,7 @@ pub(in crate::capi) unsafe fn read_scalars(
     scalars: *const frz_shallow_scalar,
     count: usize,
 ) -> Outcome<Vec<Scalar>> {
-    refuse(count > MAX_SCALARS, || format!("{count} scalars are more than {MAX_SCALARS}"))?;
+    refuse(count > MAX_SCALARS, || format!("{count} scalars: at most {MAX_SCALARS} are allowed"))?;
     let mut given = Vec::new();
     // SAFETY: guaranteed by the caller.
     let scalar = |scalar: frz_shallow_scalar| unsafe { scalar.scalar() };

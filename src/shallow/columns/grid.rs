@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::error::{Error, Result};
 use crate::numeric::checks::ensure;
 
-/// The maximum integer height; heights lie from 0 to this, so that sums of two of them fit 32 bits.
+/// The maximum integer height. Heights are from 0 to this: the sum of any two that are below it fits in 32 bits.
 pub const TOP: i32 = 1 << 30;
 /// The bottom of a solid that has no lower end.
 pub const BOTTOMLESS: i32 = i32::MIN;
@@ -27,7 +27,7 @@ impl Grid {
     /// Checks the numbers.
     ///
     /// # Errors
-    /// `Argument`: a cell not within 1e-9 to 1e9 m, an origin that is not finite, no cell or over 65,536 along an axis.
+    /// `Argument`: a cell not within 1e-9 to 1e9 m, an origin that is not finite, 0 cells or over 65,536 along an axis.
     pub fn validate(&self) -> Result<()> {
         let [nx, nz] = self.size;
         let [x, z] = self.origin;
@@ -53,7 +53,7 @@ impl Grid {
         z * self.size[0] + x
     }
 
-    /// The cell of an index.
+    /// The cell (x, z) with this index.
     pub fn position(&self, index: usize) -> [usize; 2] {
         [index % self.size[0], index / self.size[0]]
     }
@@ -117,12 +117,12 @@ impl Heights {
         ((height - self.low) / self.unit).round().clamp(0.0, f64::from(TOP)) as i32
     }
 
-    /// The height of an integer (m).
+    /// Converts an integer height to metres.
     pub fn metres(&self, height: i32) -> f64 {
         self.low + f64::from(height) * self.unit
     }
 
-    /// A difference of heights (m).
+    /// Converts a difference of heights from units to metres.
     pub fn length(&self, units: f64) -> f64 {
         units * self.unit
     }

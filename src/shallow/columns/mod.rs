@@ -1,7 +1,8 @@
 //! Columns: the room for liquid above each solid of a cell, stored in strips (thesis 4.1.1, Fig. 4.2).
 //!
 //! A strip is 16 cells along x on one layer; a column's layer is its position from the bottom of its cell. Strips exist only where they
-//! have a column, and are sorted by row, then layer, then x: a run of them is one array, and everything that a row needs is contiguous.
+//! have a column, and are sorted by row, then layer, then x: the numbers of successive strips are contiguous, and so is all that a row
+//! needs.
 
 pub mod grid;
 pub(super) mod per_column;
@@ -205,7 +206,7 @@ impl Columns {
         self.strips[strip] = position;
     }
 
-    /// Sets which positions of a strip have a column; the caller writes its numbers, which are 0 elsewhere.
+    /// Sets which positions of a strip have a column; the caller writes the strip's numbers, with 0 where there is no column.
     pub(super) fn set_strip(&mut self, strip: usize, present: u16) -> StripMut<'_> {
         self.present[strip] = present;
         StripMut {
@@ -249,7 +250,7 @@ impl Columns {
         self.rows[row] as usize..self.rows[row + 1] as usize
     }
 
-    /// The strip at the same position of the previous row, or [`NONE`].
+    /// The strip of the same layer and x in the previous row, or [`NONE`].
     pub fn north(&self, strip: usize) -> u32 {
         self.north[strip]
     }
@@ -259,7 +260,7 @@ impl Columns {
         self.strips.iter().map(|strip| strip.layer as usize + 1).max().unwrap_or(0)
     }
 
-    /// The strip at the same position of the next row, or [`NONE`].
+    /// The strip of the same layer and x in the next row, or [`NONE`].
     pub fn south(&self, strip: usize) -> u32 {
         self.south[strip]
     }
@@ -270,7 +271,7 @@ impl Columns {
         (*next == Strip { at: own.at + 1, ..own }).then_some(strip + 1)
     }
 
-    /// The previous strip along x, if it exists: it has the index before.
+    /// The previous strip along x, if it exists: it has the previous index.
     pub fn west(&self, strip: usize) -> Option<usize> {
         strip.checked_sub(1).filter(|&before| self.east(before) == Some(strip))
     }
@@ -326,7 +327,7 @@ impl Columns {
         (0..).map_while(move |layer| self.column(cell, layer))
     }
 
-    /// The column of a cell that contains a height (m) or is nearest to it, and how far off that is (m).
+    /// The column of a cell that contains a height (m) or is nearest to it, and its distance from this height (m).
     pub fn nearest(&self, cell: [usize; 2], height: f64) -> Option<(usize, f64)> {
         let off = |index: usize| {
             let [base, ceiling] =

@@ -1,4 +1,4 @@
-//! Numbers by column index, with arrays offset in memory so that those of one column do not collide in the cache.
+//! Numbers by column index, in arrays offset in memory, so that the numbers of one column do not collide in the cache.
 //!
 //! A step reads and writes a dozen arrays at once. Large allocations from the system begin at about the same offset in a page; the arrays
 //! then compete for a few sets of the L1 cache, and a read is mistaken for one of data just written to another array: a step takes up to a
@@ -51,7 +51,7 @@ pub struct PerColumn<T> {
     array: Array,
     /// Unused numbers before the first one, which give the array its offset.
     before: usize,
-    /// Capacity: arrays of one liquid grow in the same frame, and then not again for long.
+    /// Capacity: arrays of one liquid grow in the same frame, and then not again for a long time.
     room: usize,
     list: Vec<T>,
 }
@@ -90,7 +90,7 @@ impl<T: Copy> PerColumn<T> {
         if len <= self.room {
             return;
         }
-        // At least doubled, as a list does.
+        // At least doubles, as `Vec` does.
         self.room = len.max(2 * self.room);
         let mut list = Vec::with_capacity(self.room + PAGE / size_of::<T>());
         let at = <*const T>::addr(list.as_ptr());

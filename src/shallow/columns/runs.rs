@@ -29,7 +29,7 @@ pub fn fill_runs<T: Copy + Default>(
     out[end * STRIP..].fill(T::default());
 }
 
-/// The first strip, from `from` on, whose mark equals `wanted`; otherwise the count of all.
+/// The first strip, from `from` on, whose mark equals `wanted`; the count of strips if there is none.
 pub fn find(marks: &[bool], from: usize, wanted: bool) -> usize {
     let rest = &marks[from..];
     // Skips many at once where none matches.

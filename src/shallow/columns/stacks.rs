@@ -11,7 +11,7 @@ use crate::numeric::lists::{refill, reset};
 pub(in crate::shallow) struct Stacks {
     /// Maximum number of layers in a block.
     layers: usize,
-    /// Layers of each block.
+    /// Count of layers of each block.
     counts: Vec<u32>,
     /// Strips, by block x layers + layer.
     strips: Vec<u32>,
@@ -19,7 +19,7 @@ pub(in crate::shallow) struct Stacks {
     extents: Vec<[i32; 2]>,
     /// Whether all cells of the row have ground without a lower end.
     pub is_grounded: bool,
-    /// If not, for each cell the height below which it is void: `i32::MIN` if none is, `i32::MAX` if all is.
+    /// If not, for each cell the height below which it is void: `i32::MIN` if it is nowhere void, `i32::MAX` if it is void everywhere.
     pub sills: Vec<i32>,
 }
 
@@ -74,7 +74,7 @@ impl Stacks {
         &self.strips[first..first + self.counts[block] as usize]
     }
 
-    /// Lowest bases and highest ceilings of the strips of a block; empty ranges without a column.
+    /// Lowest bases and highest ceilings of the strips of a block; an empty range for a strip without a column.
     #[inline]
     pub fn extents(&self, block: usize) -> &[[i32; 2]] {
         let first = block * self.layers;

@@ -80,8 +80,8 @@ impl Shallow {
         self.land_all(landed);
     }
 
-    /// Adds landed liquid to its columns, all of a column at once, so that the result does not depend on an order, and spreads what finds
-    /// no room there to adjacent columns; returns what falls from there into the void.
+    /// Adds landed liquid to its columns, all of a column at once, so that the result does not depend on the order of landings, and spreads
+    /// what finds no room there to adjacent columns; returns what falls from there into the void.
     fn land_all(&mut self, mut landed: Vec<Landing>) -> i64 {
         merge(&mut landed);
         let max_landings = self.params.falls.map_or(0, |falls| LANDINGS_PER_PACKET * falls.max_packets);

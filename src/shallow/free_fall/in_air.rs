@@ -24,7 +24,7 @@ pub(in crate::shallow) struct Falling {
     /// Landings of a step; kept to avoid repeated allocation.
     pub(super) landed: Vec<Landing>,
     pub(super) rivulets: Rivulets,
-    /// Seconds since packets were last created, and how many times they were.
+    /// Seconds since packets were last created, and how many times packets were created.
     pub since: f64,
     pub tick: u64,
 }

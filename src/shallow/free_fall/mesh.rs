@@ -1,9 +1,9 @@
 //! A triangle mesh of the liquid in the air, written into the caller's buffers: a ball for each drop, and strands between consecutive drops
 //! of an overflow edge, and from the edge to the newest drop.
 //!
-//! The section of a strand is the volume of its drops over their distance. From a length of 9.02 radii, the fastest-growing wavelength in a
-//! jet of low viscosity (Rayleigh 1878), its liquid drains into its drops, and at twice that length it has broken. Drops in a strand are as
-//! thick as it.
+//! The cross-section of a strand is the mean volume of its two drops divided by their distance. From a length of 9.02 radii, the
+//! fastest-growing wavelength in a jet of low viscosity (Rayleigh 1878), its liquid drains into its drops, and at twice that length it has
+//! broken. Drops in a strand are as thick as the strand.
 
 use super::Droplet;
 use crate::error::Result;
@@ -21,22 +21,22 @@ const RINGS: usize = 3;
 const CIRCUMRADIUS: f64 = 1.099_636;
 /// Length, in radii, from which on a strand between two drops gets thinner; it breaks at twice that.
 const THINNING_LENGTH: f64 = 9.02;
-/// How much wider it is at its overflow edge, where it is as thick as the film.
+/// Factor by which a strand is wider at its overflow edge, where it is as thick as the film.
 const FLARE: f64 = 1.6;
 
 /// Buffers of the caller. They are written sequentially from the beginning and never read, and may be longer than the mesh; leave out those
 /// that are not needed. The balls' vertices come first, in the order of their drops.
 #[derive(Debug, Default)]
 pub struct Target<'a> {
-    /// Three numbers a vertex (m x scale).
+    /// Three numbers per vertex (m x scale).
     pub positions: Option<&'a mut [f32]>,
-    /// Three numbers a vertex: a unit vector.
+    /// Three numbers per vertex: a unit vector.
     pub normals: Option<&'a mut [f32]>,
-    /// Three numbers a vertex: velocity of its drop (m/s x scale).
+    /// Three numbers per vertex: velocity of its drop (m/s x scale).
     pub velocities: Option<&'a mut [f32]>,
-    /// One a vertex: the index of its drop in the list of drops.
+    /// One number per vertex: the index of its drop in the list of drops.
     pub drops: Option<&'a mut [u32]>,
-    /// Three a triangle.
+    /// Three indices per triangle.
     pub indices: Indices<'a>,
 }
 
@@ -45,7 +45,7 @@ pub fn bound(drops: usize) -> Counts {
     of(drops, drops)
 }
 
-/// Counts for `drops` drops and `strands` strands; the strands' vertices are extras.
+/// Counts for `drops` drops and `strands` strands; the strands' vertices count as `extras`.
 fn of(drops: usize, strands: usize) -> Counts {
     let extras = RINGS * SIDES * strands;
     let triangles = BALL[1] * drops + 2 * (RINGS - 1) * SIDES * strands;
@@ -69,7 +69,7 @@ pub struct Balls {
     /// Directions of a ball's vertices, and its triangles, counter-clockwise from outside.
     vertices: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
-    /// Radius of the ball's vertices, for which its volume is that of a ball of radius 1.
+    /// Radius of the ball's vertices, at which the mesh has the volume of a ball of radius 1.
     size: f64,
     /// Drops by overflow edge, in the order in which they left it.
     order: Vec<u32>,
@@ -134,7 +134,7 @@ impl Balls {
         refill(
             &mut self.radii,
             drops.iter().zip(&self.sums).map(|(drop, &[radius, undrained, count])| {
-                // In drops that are close together, the strand is no thicker than the drop.
+                // Between drops that are close together, the strand is no thicker than the drop.
                 let part = if count > 0.0 { undrained / count } else { 0.0 };
                 let strand = if count > 0.0 { (radius / count).min(drop.radius) } else { 0.0 };
                 drop.radius + part * (strand - drop.radius)

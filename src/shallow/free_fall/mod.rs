@@ -10,9 +10,9 @@
 //!
 //! A packet begins at the base of the overflow edge, with the velocity of the liquid there. This is limited to the velocity at the brink of
 //! a free overfall, 1.4 times the critical velocity of its flow (Rouse, Civil Engineering 6, 1936), or to that of the liquid that arrives
-//! there, if it is faster. It flies without drag, and lands on and around the first surface that it hits; without room there, it is handled
-//! as where the terrain moves (`remap/held.rs`). At a wall it stops, and falls down along it. Where there is no ground it leaves the domain
-//! below its minimum height, or over an open border, and is lost.
+//! there, if it is faster. It flies without drag, and lands on and around the first surface that it hits; liquid that finds no room there
+//! is handled as when the terrain moves (`remap/held.rs`). At a wall it stops, and falls down along it. Where there is no ground it leaves
+//! the domain below its minimum height, or over an open border, and is lost.
 
 mod falling;
 mod flight;
@@ -47,7 +47,7 @@ pub struct Droplet {
     pub age: f64,
     /// Its overflow edge: the same number for all drops from one side of one column.
     pub source: u64,
-    /// Concentration of each scalar, in the scalar's own measure.
+    /// Concentration of each scalar, in the scalar's own unit.
     pub concentrations: [f32; MAX_SCALARS],
     /// Where the liquid leaves the ground; only for the newest drop there.
     pub overflow_edge: Option<OverflowEdge>,

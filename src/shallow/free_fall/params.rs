@@ -8,10 +8,10 @@ use crate::shallow::pipes::cliffs::Cliffs;
 /// Parameters of falling liquid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Falls {
-    /// Height (m) from which on liquid falls freely, from the base of the donor column to the surface below; 0 and up. Default: 0.01. Steps
-    /// of less than a cell are not falls.
+    /// Liquid falls freely where the surface below is more than this (m) below the base of the donor column; 0 or more. Default: 0.01. Over
+    /// steps lower than a cell's edge it never does.
     pub height: f64,
-    /// Time between packets of an overflow edge (s), 0.0001 to 1, at least a step. Default: 1/120.
+    /// Time between packets of an overflow edge (s), 0.0001 to 1; a step, if that is longer. Default: 1/120.
     pub interval: f64,
     /// Volume of a drop (m3), 0 or more. If an overflow edge takes longer than 8 intervals to deliver this volume, its liquid waits there
     /// until there is enough for one drop, for 60 intervals at most. Default: 6.5e-11, a ball half a millimetre across.

@@ -37,9 +37,9 @@ struct ActiveEdge {
 /// Lists of overflow edges; kept to avoid repeated allocation.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rivulets {
-    /// By cell.
+    /// Sorted by cell.
     edges: Vec<ActiveEdge>,
-    /// By decreasing strength.
+    /// Indices of `edges`, by decreasing strength.
     order: Vec<u32>,
 }
 
@@ -102,7 +102,7 @@ impl Rivulets {
         }
     }
 
-    /// A rivulet takes weaker edges nearby, unless a stronger one does; of two equally strong rivulets, the nearer one does.
+    /// A rivulet takes weaker edges nearby, unless a stronger rivulet takes them; of two equally strong ones, the nearer takes them.
     fn take_around(&mut self, at: u32, [reach, step]: [i32; 2], cells: usize, [nx, nz]: [usize; 2]) {
         let own = self.edges[at as usize];
         let [x, z] = [own.cell as usize % nx, own.cell as usize / nx];
@@ -152,7 +152,7 @@ impl Rivulets {
         }
         for edge in &self.edges {
             let own = &mut waiting[edge.link as usize];
-            // A sum of integers, so that it does not depend on an order.
+            // A sum of integers, so that it does not depend on their order.
             own.impulse += own.gathered as f64;
             own.gathered = 0;
             let inflow = (own.units - own.before).max(0);

@@ -20,7 +20,7 @@ pub(super) struct Landing {
     pub amounts: [i64; MAX_SCALARS],
 }
 
-/// Adds up the landings on each column, so that the result does not depend on an order; sorts by column.
+/// Adds up the landings on each column, so that the result does not depend on their order; sorts by column.
 pub(super) fn merge(landed: &mut Vec<Landing>) {
     landed.sort_unstable_by_key(|landing| landing.column);
     landed.dedup_by(|next, first| {
@@ -79,7 +79,7 @@ fn for_each_spread(columns: &Columns, landing: &Landing, mut with: impl FnMut(u3
             if cell[0] >= grid.size[0] || cell[1] >= grid.size[1] {
                 continue;
             }
-            // At most one column a cell, no further up or down than a slope of 45 degrees.
+            // At most one column per cell, no further up or down than a slope of 45 degrees.
             let max_rise = step * f64::from(away).sqrt();
             let joins = |&column: &usize| {
                 f64::from((columns.bases()[column] - base).abs()) <= max_rise && columns.overlap(own, column)

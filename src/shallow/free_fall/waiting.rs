@@ -22,14 +22,14 @@ pub(in crate::shallow) struct Waiting {
     pub amounts: [i64; MAX_SCALARS],
     /// Outward speed (cells/s), times units.
     pub impulse: f64,
-    /// Direction of the last fall: from the link's second column.
+    /// Whether the last fall was from the link's second column.
     pub is_back: bool,
     /// Intervals that it has waited.
     pub waits: u32,
     /// Smoothed inflow of an interval (units), and the volume at the end of the last interval.
     pub steady: i64,
     pub before: i64,
-    /// Lead of its packets within the interval, in 2^-31 of it: scattered by the inflow at the time the flow grew.
+    /// How far its packets are ahead within the interval (in 2^-31 of it): a hash of the inflow at which the flow grew.
     pub phase: u32,
     /// Impulse received from other overflow edges; 0 between intervals.
     pub gathered: i64,

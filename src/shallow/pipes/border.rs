@@ -9,6 +9,6 @@ pub enum Border {
     /// Nothing: liquid flows off along the slope of the ground near the border, and is counted as lost.
     Open,
     /// Liquid at rest, at the height to which the domain was last filled: waves leave and are not reflected. Outflow and inflow are
-    /// counted. The border is open before the first filling, and where the ground is higher.
+    /// counted. Before the first filling, and where the ground is above that height, the border acts like [`Border::Open`].
     Absorbing,
 }

@@ -49,7 +49,7 @@ impl Cliffs {
     }
 }
 
-/// The index of the same layer beyond a side.
+/// The index beyond a side, in the same layer.
 pub(in crate::shallow) fn index_beyond(columns: &Columns, i: usize, side: Side) -> Option<usize> {
     let (strip, position) = (i / STRIP, i % STRIP);
     let at = |strip: u32| (strip != NONE).then(|| strip as usize * STRIP + position);

@@ -238,7 +238,7 @@ impl<'a> Joiner<'a> {
         slopes::openness(along as f64, across as f64, self.scale)
     }
 
-    /// The rise across a side's axis, at a column of this row or the next one.
+    /// Twice the rise (units) across a side's axis, at a column of this row or the next one.
     fn across(&self, i: usize, side: Side) -> i64 {
         let row = usize::from(i >= self.starts[1]);
         let rises = if side.is_along_x() { &self.rises[row].z } else { &self.rises[row].x };

@@ -1,8 +1,8 @@
 //! Openness of regular pipes (thesis 4.1.1), strip by strip.
 //!
-//! The thesis derives viscosity for level ground. On ground of slope S a film of vertical depth H is thinner by cos, and driven along the
-//! slope: its discharge is that on level ground divided by (1 + S^2)^2. Rises are differences of integers, so that results are the same
-//! from either side.
+//! The thesis derives viscosity for level ground. On ground of slope S a film of vertical depth H is thinner by the cosine of the slope,
+//! and driven along it: its discharge is that on level ground divided by (1 + S^2)^2. Rises are differences of integers, so that results
+//! are the same from either side.
 
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_mut, strip_of};
@@ -41,7 +41,7 @@ impl Rises {
     }
 }
 
-/// Factor from rises, multiplied by four, to slopes.
+/// Factor from four times a rise (units) to a slope.
 pub(super) fn scale(columns: &Columns) -> f64 {
     columns.heights.unit / (4.0 * columns.grid.cell)
 }
@@ -100,8 +100,8 @@ fn twice([before, behind]: [i32; 2], [has_before, has_behind]: [i32; 2]) -> i32 
     (behind | (before & !has_behind)) + (before | (behind & !has_before))
 }
 
-/// All bits set for the sides that are walls: the ground there rises or falls by over `wall_rise`, and does not continue so on the other
-/// side.
+/// All bits set for the sides that are walls: the ground there rises or falls by over `wall_rise`, unless it continues likewise on the
+/// other side.
 #[inline(always)]
 fn walls([before, behind]: [i32; 2], wall_rise: i32) -> [i32; 2] {
     let is_steep = [before, behind].map(|step| -i32::from(step.abs() > wall_rise));

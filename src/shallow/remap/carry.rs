@@ -15,7 +15,7 @@ type Carried = [f32; 2];
 /// A link before the change.
 #[derive(Debug, Clone, Copy)]
 struct OldLink {
-    /// Its cell along x.
+    /// x of its cell.
     x: u32,
     from: u32,
     to: u32,
@@ -208,8 +208,8 @@ impl Change<'_> {
         self.columns.strips()[(strip as u32).wrapping_add(shift) as usize]
     }
 
-    /// The former flux and remainder of the regular pipe of an old index over a side. Pipes after the
-    /// band stay regular and are never asked for, so `flow` has not shifted at other indices.
+    /// The former flux and remainder of the regular pipe of an old index over a side. Pipes after the band stay regular and are never asked
+    /// for; those before it have not shifted in `flow`.
     fn regular(&self, flow: &Flow, index: u32, side: Side) -> Carried {
         let axis = usize::from(side == Side::South);
         let (strip, range) = (index as usize / STRIP, self.band.range());

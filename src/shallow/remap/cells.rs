@@ -54,7 +54,7 @@ pub(super) struct Cell {
     pub new: Vec<NewColumn>,
     /// Underside of the lowest solid after the change.
     pub under: i32,
-    /// If there are several columns, one whose base moves further than this (units) counts as another one.
+    /// If there are several columns, one whose base moves further than this (units) counts as a new one.
     pub reach: i64,
     parcels: Vec<Parcel>,
     costs: Vec<i64>,

@@ -8,7 +8,7 @@ use crate::shallow::columns::grid::Cells;
 /// Cells whose solids change.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Dirty {
-    /// Blocks of 16 cells in a row.
+    /// Count of blocks of 16 cells in a row.
     pub blocks: usize,
     /// Bits of the dirty cells of each block, row by row.
     cells: Vec<u16>,

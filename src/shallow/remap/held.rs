@@ -1,6 +1,6 @@
 //! Liquid that found no room when the terrain moved: it goes to adjacent cells, and waits if it finds no room there either.
 //!
-//! Shares are whole units and do not depend on an order, so that a mirrored scene gets mirrored shares.
+//! Shares are whole units and do not depend on the order of parcels, so that a mirrored scene gets mirrored shares.
 
 use crate::numeric::lists::refill;
 use crate::shallow::columns::Columns;

@@ -11,7 +11,7 @@ use crate::shallow::columns::{Columns, NONE, STRIP, Strip, strip_mut, strip_of};
 use crate::shallow::scalars::MAX_SCALARS;
 use crate::shallow::terrain::solids::Solid;
 
-/// If a cell has several columns, one whose base moves by more than this many cells counts as another column.
+/// If a cell has several columns, one whose base moves by more than this many cells counts as a new one.
 const REACH: f64 = 4.0;
 
 /// Buffers.
@@ -151,7 +151,7 @@ fn keep_strip<T: Copy + Default>(
     }
 }
 
-/// The strips above each other, before and after the change.
+/// The strips of a block, above each other, before and after the change.
 struct Block<'a> {
     /// Bits of the cells whose solids change.
     cells: u16,

@@ -53,7 +53,7 @@ pub struct Moved {
 impl Shallow {
     /// Changes the terrain everywhere.
     ///
-    /// Nothing is allocated while there are no more columns and links than ever before.
+    /// Nothing is allocated unless there are more columns or links than ever before.
     ///
     /// # Errors
     /// `Argument`: solids of other cells or heights, or none at all.
@@ -70,7 +70,7 @@ impl Shallow {
     /// counted along x, then z, as [`Caster::at`](super::terrain::triangles::Caster::at) does: disjoint, from the lowest up. It is called
     /// more than once.
     ///
-    /// Nothing is allocated while there are no more columns and links than ever before, and no larger box.
+    /// Nothing is allocated unless there are more columns or links, or a larger box, than ever before.
     ///
     /// # Errors
     /// `Argument`: the box is not within the domain.

@@ -7,13 +7,13 @@ use crate::shallow::columns::{NONE, STRIP};
 /// The columns of a band, and those around it whose indices shift.
 #[derive(Debug, Clone)]
 pub(super) struct Origins {
-    /// First strip of the band, and its counts of strips before and now.
+    /// First strip of the band, and its counts of strips before and after the change.
     first: usize,
     counts: [usize; 2],
-    /// For each strip, the strip of the same layer before, within the band, or [`NONE`]; and the bits of its columns that were columns
-    /// there.
+    /// For each strip, the former strip of the same layer (its index in the band), or [`NONE`]; and the bits of the columns that were
+    /// columns there.
     strips: Vec<(u32, u16)>,
-    /// Columns that were in other layers: their indices, and the former ones, within the band.
+    /// Columns that were in other layers: their indices, and their former indices in the band.
     pub relayered: Vec<[u32; 2]>,
 }
 
@@ -61,7 +61,7 @@ impl Origins {
         self.counts[1].wrapping_sub(self.counts[0]) as u32
     }
 
-    /// The former strip of a strip, among all, and the bits of its columns that were columns there.
+    /// The former strip of a strip (its index among all strips), and the bits of the columns that were columns there.
     #[inline]
     pub fn strip(&self, strip: usize) -> (usize, u16) {
         if strip < self.first {
@@ -74,7 +74,7 @@ impl Origins {
         }
     }
 
-    /// The former index of a column, among all.
+    /// The former index of a column, among those of all columns.
     pub fn column(&self, index: u32) -> Option<u32> {
         let position = index as usize % STRIP;
         let (strip, positions) = self.strip(index as usize / STRIP);

@@ -16,7 +16,7 @@ const PARTIES: usize = 2048;
 /// The origin or destination of an amount.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::shallow) enum Account {
-    /// Poured in, less what was removed.
+    /// Poured in, less what negative pours removed.
     Poured,
     /// Added by sources.
     Sourced,
@@ -176,8 +176,8 @@ impl Amounts {
         }
     }
 
-    /// Adds the amounts of liquid that is added to a column (negative: removed), and accounts for them. There were `before` units; added
-    /// liquid has these concentrations.
+    /// Adds the amounts of liquid that is added to a column (negative: removed), and accounts for them. The column had `before` units;
+    /// added liquid has these concentrations.
     pub fn add(&mut self, index: usize, before: i64, added: i64, levels: &Levels, account: Account) {
         for (at, level_in) in levels.iter().enumerate().take(self.count()) {
             let amount = &mut self.amounts[at][index];

@@ -11,8 +11,8 @@ pub struct Scalar {
     pub name: String,
     /// How it changes.
     pub law: Law,
-    /// Concentrations are within -range to range, in the scalar's own unit, and are stored in steps of 2^-20 of it; 1e-9 to 1e9. For
-    /// example 1 for a dye, 100 (K) for a temperature above that of the room, 3600 (s) for an age.
+    /// The maximum absolute concentration, in the scalar's own unit, 1e-9 to 1e9: for example 1 for a dye, 100 K for a temperature relative
+    /// to the room's, 3600 s for an age. Concentrations are stored in steps of 2^-20 of this.
     pub range: f64,
 }
 
@@ -39,7 +39,7 @@ impl Scalar {
         }
     }
 
-    /// A concentration in levels.
+    /// Converts a concentration to levels.
     pub fn level(&self, concentration: f64) -> Result<i32> {
         let (Self { name, range, .. }, min) = (self, -self.range);
         ensure(
@@ -53,12 +53,12 @@ impl Scalar {
 /// How a scalar changes besides being carried.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Law {
-    /// It does not: dye, salt, heat.
+    /// It does not change, as dye or salt.
     Dye,
-    /// Decays by half in each half-life (s), 1e-6 to 1e12: heat that is lost to a room.
+    /// It halves in each half-life (s), 1e-6 to 1e12, as heat that is lost to a room.
     Decays(f64),
-    /// The time (s) since the liquid came in, averaged over the liquid of a column, clamped to `range`; the age of liquid that comes in is
-    /// its concentration.
+    /// The time (s) since the liquid came in, averaged over the liquid of a column, clamped to `range`. The concentration set for liquid
+    /// that comes in is its age at that moment.
     Ages,
 }
 

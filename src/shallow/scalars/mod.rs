@@ -26,7 +26,7 @@ use shares::{LEVELS, Levels};
 pub struct ScalarBalance {
     /// In the columns.
     pub inside: f64,
-    /// Poured in so far, less what was removed.
+    /// Poured in so far, less what negative pours removed.
     pub poured: f64,
     /// Added by sources.
     pub sourced: f64,
@@ -44,9 +44,9 @@ pub struct ScalarBalance {
     pub falling: f64,
     /// Added by its law; negative: removed.
     pub grown: f64,
-    /// Removed from columns that ran dry, where rounding left a few of the smallest amounts.
+    /// Removed from columns that ran dry: the remainders of rounding.
     pub dried: f64,
-    /// Unaccounted for (in smallest amounts): 0.
+    /// Unaccounted for, as an integer amount: always 0.
     pub error: i128,
 }
 
@@ -59,7 +59,7 @@ impl Shallow {
     pub fn set_scalars(&mut self, scalars: &[Scalar]) -> Result<()> {
         ensure(
             scalars.len() <= MAX_SCALARS,
-            format_args!("{} scalars are more than {MAX_SCALARS}", scalars.len()),
+            format_args!("{} scalars: at most {MAX_SCALARS} are allowed", scalars.len()),
         )?;
         for (at, scalar) in scalars.iter().enumerate() {
             scalar.validate().map_err(|error| Error::argument(format!("scalar {at}: {error}")))?;

@@ -34,7 +34,7 @@ pub(in crate::shallow) fn level(amount: f64, depth: i32) -> f64 {
 }
 
 /// The amount in this many units at a concentration. Rounding is monotonic here and in [`level`]: if a concentration is at most some
-/// integer, the amount is at most that integer times the units. All units of a column have its whole amount.
+/// integer, the amount is at most that integer times the units. The share of all of a column's units is its whole amount.
 #[inline(always)]
 pub(in crate::shallow) fn share(level: f64, units: f64) -> f64 {
     nearest(level * units)
@@ -45,7 +45,7 @@ pub(in crate::shallow) fn part(amounts: &[i64; MAX_SCALARS], units: i64, all: i6
     amounts.map(|amount| (i128::from(amount) * i128::from(units) / i128::from(all.max(1))) as i64)
 }
 
-/// Moves the part of amounts that belongs to `units` out of `all` to others.
+/// Moves the part of amounts that belongs to `units` out of `all` to the amounts `to`.
 pub(in crate::shallow) fn take(
     from: &mut [i64; MAX_SCALARS],
     units: i64,

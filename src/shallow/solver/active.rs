@@ -224,7 +224,7 @@ impl Active {
         self.refresh(columns, depth);
     }
 
-    /// Whether a strip might have an inactive neighbour. A cheap test: nearly always none is.
+    /// Whether a strip might have an inactive neighbour. A cheap test: nearly always there is none.
     fn may_have_inactive_neighbour(&self, columns: &Columns, strip: usize) -> bool {
         let active = |other: u32| other == NONE || self.active[other as usize];
         let next = self.active.get(strip + 1).is_none_or(|next| *next);
@@ -295,7 +295,7 @@ impl Active {
         }
     }
 
-    /// Marks a row and the next one, because its spans refer to those of this row.
+    /// Marks a row as stale, and the next one, whose spans refer to it.
     fn make_stale(&mut self, row: usize) {
         self.any_stale = true;
         self.stale[row] = true;

@@ -1,10 +1,10 @@
 //! Fast films: they outrun waves, and their inertia is reduced.
 //!
-//! In a film on a slope a disturbance travels at 3 u. Where waves are slower, at c, the liquid's inertia lets each bump grow: roll waves.
-//! Liquid that advects its momentum and has surface tension grows them far more slowly, if at all. A pipe between wet columns where 3 u > c
-//! is *fast*: its inertia is divided so that (c dt / dx)^2 is [`FAST_WAVES`]. The discharge of a steady film does not depend
-//! on its inertia. Which pipes are fast is found at the start of each frame, from the state alone. Where steps are so long that a
-//! disturbance would pass more than a cell in one, and grow, the flux of a fast pipe is limited.
+//! In a film on a slope a disturbance travels at three times the liquid's velocity u. Where waves are slower, at c, the liquid's inertia
+//! lets each bump grow: roll waves. In real liquid, which advects its momentum and has surface tension, they grow far more slowly, if at
+//! all. A pipe between wet columns where 3 u > c is *fast*: its inertia is divided so that (c dt / dx)^2 is [`FAST_WAVES`]. The discharge
+//! of a steady film does not depend on its inertia. Which pipes are fast is found at the start of each frame, from the state alone. Where
+//! a disturbance would travel further than a cell in a step, and grow, the flux of a fast pipe is limited.
 
 use std::ops::Range;
 
@@ -16,7 +16,7 @@ use crate::shallow::columns::{NONE, STRIP, resize_part, strip_from, strip_of};
 
 /// (c dt / dx)^2 of a fast pipe: below 1/2, the bound of stability.
 pub const FAST_WAVES: f32 = 0.35;
-/// Maximum inertia divisor: shallower films are never fast for long.
+/// Maximum inertia divisor: films so shallow that they would need more do not stay fast for long.
 const MAX_LIGHT: f32 = 16.0;
 /// Minimum inertia divisor of a fast pipe: once packed, it must differ from 1, which all other pipes have.
 const MIN_LIGHT: f32 = 1.0 + 1.0 / 128.0;
@@ -27,7 +27,7 @@ pub const NORMAL: u32 = 0x3f80_3f80;
 /// Where inertia is reduced.
 #[derive(Debug, Clone)]
 pub struct Fast {
-    /// Inertia divisors of the pipes of each column, to the east and to the south ([`packed`]); of rows that have fast pipes.
+    /// Inertia divisors of the pipes of each column, to the east and to the south ([`packed`]); only valid in rows that have fast pipes.
     pub(super) light: PerColumn<u32>,
     /// Whether each strip has fast pipes; only valid in rows that have some.
     pub(super) strips: Vec<bool>,
@@ -84,8 +84,8 @@ impl Fast {
         self.rows.fill(false);
     }
 
-    /// Finds the rows with fast pipes. Returns a count of cells, a power of two: the smallest that no disturbance exceeds during `step`
-    /// times the last step, or `max_cells` if that is less.
+    /// Finds the rows with fast pipes. Returns the smallest power of two, in cells, that no disturbance exceeds in a step `step` times as
+    /// long as the last one, or `max_cells` if that is less.
     pub fn find(&mut self, films: &Films, step: f32, max_cells: u32) -> u32 {
         let rows = &mut self.rows[..];
         dispatch!(find_rows(rows: &mut [bool], films: &Films, step: f32, max_cells: u32) -> u32)
@@ -215,8 +215,8 @@ impl<'a> FilmSpan<'a> {
         is_fast(drive, [min_depth; 2], f32::from_bits(max_flux as u32))
     }
 
-    /// Whether one of its pipes is fast; with `TRAVEL`, also whether a disturbance in one of those travels further than a cell in `step`
-    /// times the last step.
+    /// Whether one of its pipes is fast; with `TRAVEL`, also whether a disturbance in a fast pipe travels further than a cell in a step
+    /// `step` times as long as the last one.
     #[inline(always)]
     fn find<const TRAVEL: bool>(&self, drive: f32, step: f32) -> [bool; 2] {
         let (mut any, mut farther) = ([0; STRIP], [0; STRIP]);

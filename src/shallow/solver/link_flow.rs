@@ -10,7 +10,7 @@ use crate::shallow::scalars::MAX_SCALARS;
 /// The flow through each link.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LinkFlow {
-    /// Flux (units a step).
+    /// Flux (units per step).
     pub flux: Vec<f32>,
     /// Remainder of the transfer (units).
     pub remainder: Vec<f32>,

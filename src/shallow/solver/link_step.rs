@@ -147,14 +147,14 @@ impl LinkPart<'_> {
     }
 }
 
-/// The flux that the next step drives through a link (units a step), given the surface drop and both depths (units).
+/// The flux that the next step drives through a link (units per step), given the surface drop and both depths (units).
 fn driven<K: StepKind>(step: &Step, fall: i32, depth: [f32; 2], flux: f32, open: f32) -> f32 {
     let light = if K::VISCOUS && !K::WHOLE { fast_films::light(step, depth, flux) } else { 1.0 };
     step.rest_if_slow::<K>(fall, depth, flux_of::<K>(step, fall, depth, flux, open, light))
 }
 
-/// The flux of a wave that leaves over the border (units a step): a surface that is `fall` above the one at rest flows out at the speed of
-/// waves (Sommerfeld's condition), and waves are not reflected.
+/// The flux of a wave that leaves over the border (units per step): a surface that is `fall` above the one at rest flows out at the speed
+/// of waves (Sommerfeld's condition), and waves are not reflected.
 fn radiated(step: &Step, fall: i32, depth: [f32; 2]) -> f32 {
     let mean = if step.is_whole { step.section } else { min(0.5 * (depth[0] + depth[1]), step.section) };
     if fall.saturating_abs() <= step.rest_drop {

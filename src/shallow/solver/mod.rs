@@ -72,7 +72,7 @@ pub struct Flow {
 
 /// The parts that a restored state replaces.
 pub(super) struct Stored<'a> {
-    /// Whether each strip is worked on.
+    /// Whether each strip is wet or beside a wet one.
     pub active: &'a [bool],
     /// H (units).
     pub depth: &'a mut [i32],
@@ -288,8 +288,8 @@ impl Flow {
         self.active.wake_all();
     }
 
-    /// Finds fast films. Returns a count of cells, a power of two: the smallest that no disturbance in them exceeds during `step` times the
-    /// last step, or `max_cells` if that is less. g unit dt^2 / dx^2 of the last step is `drive` (1 / units).
+    /// Finds fast films. Returns the smallest power of two, in cells, that no disturbance in them exceeds in a step `step` times as long as
+    /// the last one, or `max_cells` if that is less. `drive` is g unit dt^2 / dx^2 of the last step (1 / units).
     pub fn find_fast_films(&mut self, columns: &Columns, drive: f64, step: f64, max_cells: u32) -> u32 {
         self.active.refresh(columns, &self.depth);
         let Self { fast, active, depth, flux: [east, south], .. } = self;

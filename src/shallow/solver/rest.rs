@@ -1,9 +1,9 @@
 //! Liquid at rest: steps skip the strips in which they would change nothing.
 //!
 //! A pipe *rests* when nothing has flowed through it and nothing will: its flux and the remainder of its transfers are 0, and it is closed,
-//! or its donor is dry, or its surfaces differ by at most [`Bounds::rest_drop`], which drives nothing. A strip rests when all its pipes do,
-//! including those that its neighbours own. It sleeps when its neighbours rest, too (`active.rs`). A step would leave it as
-//! it is, to the bit: so results do not depend on which strips sleep, and strips of 16 cells along x are as good as any others.
+//! or its donor is dry, or the surfaces at its ends differ by at most [`Bounds::rest_drop`], which drives nothing. A strip rests when all
+//! its pipes do, including those that its neighbours own. It sleeps when its neighbours rest, too (`active.rs`). A step would leave it as
+//! it is, to the bit: so results do not depend on which strips sleep.
 
 use std::ops::Range;
 

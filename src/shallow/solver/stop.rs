@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Whether a frame is to end at once. The results of such a step are invalid: the caller restores the liquid.
+/// Whether a frame is to end at once. The results of the step are then invalid: the caller restores the liquid.
 #[derive(Clone, Copy)]
 pub struct Stop<'a>(Option<&'a AtomicBool>);
 

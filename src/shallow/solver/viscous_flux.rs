@@ -9,13 +9,13 @@ use crate::shallow::columns::{STRIP, strip_from, strip_mut, strip_of};
 /// The coefficients of a step that all pipes share.
 #[derive(Debug, Clone, Copy)]
 pub struct Step {
-    /// zeta = omega^dt, times the length of this step over that of the last one: stored fluxes are per last step.
+    /// zeta = omega^dt, times the length of this step divided by that of the last one, which stored fluxes refer to.
     pub kept: f32,
     /// dt^2 g unit / dx^2 (1 / units).
     pub drive: f32,
     /// 3 dt nu / unit^2 (units^2).
     pub drag: f32,
-    /// [`FAST_WAVES`](super::fast_films::FAST_WAVES) divided by `drive` (units). This over a depth is the inertia divisor of a fast
+    /// [`FAST_WAVES`](super::fast_films::FAST_WAVES) divided by `drive` (units). This divided by a depth is the inertia divisor of a fast
     /// film.
     pub light_depth: f32,
     /// The maximum transfer of a pipe of a fast film in a step, as a fraction of the donor's depth.
@@ -51,13 +51,13 @@ pub struct Thinning {
     /// 3 lambda dx / (dt unit), where dt is the length of the step that fluxes refer to: multiplied by flux / depth^2, it gives lambda
     /// times the shear rate at the ground.
     pub shear: f32,
-    /// The minimum viscosity, as part of that at rest.
+    /// The minimum viscosity, as a fraction of that at rest.
     pub thinnest: f32,
     /// (n - 1) / 2.
     pub power: f32,
 }
 
-/// Compile-time variants of a step: selected once a step, not for each pipe.
+/// Compile-time variants of a step: selected once per step, not for each pipe.
 pub trait StepKind {
     /// Whether there is viscosity.
     const VISCOUS: bool;
@@ -167,7 +167,7 @@ impl Step {
         within
     }
 
-    /// The viscosity at a flux, as part of that at rest; `square` is the square of the depth (units^2).
+    /// The viscosity at a flux, as a fraction of that at rest; `square` is the square of the depth (units^2).
     #[inline(always)]
     pub fn thinned(&self, flux: f32, square: f32) -> f32 {
         let Some(law) = self.thinning else { return 1.0 };
@@ -212,15 +212,15 @@ pub struct Row<'a> {
     pub south_depth: &'a [i32],
     /// Openness to the east and to the south.
     pub open: [&'a [f32]; 2],
-    /// Inertia divisors of the pipes to the east and to the south, where reduced (`fast_films::packed`).
+    /// Inertia divisors of the pipes to the east and to the south (`fast_films::packed`), in the strips of `is_light`.
     pub light: &'a [u32],
-    /// Strips in which some are reduced.
+    /// Whether the inertia of some pipes is reduced, for each strip.
     pub is_light: &'a [bool],
 }
 
 /// State of a span's pipes, to the east and to the south.
 pub struct PipeState<'a> {
-    /// Flux (units a step).
+    /// Flux (units per step).
     pub flux: [&'a mut [f32]; 2],
     /// Remainders of transfers (units).
     pub remainder: [&'a mut [f32]; 2],
@@ -228,8 +228,8 @@ pub struct PipeState<'a> {
     pub transfer: [&'a mut [f32]; 2],
 }
 
-/// Computes the fluxes and transfers of a span's pipes; returns whether one of a fast film was limited. With `RESTS`, slow liquid comes to
-/// rest.
+/// Computes the fluxes and transfers of a span's pipes; returns whether a flux of a fast film was limited. With `RESTS`, slow liquid comes
+/// to rest.
 #[inline(always)]
 pub fn flux_row<K: StepKind, const LIGHT: bool, const RESTS: bool>(
     step: &Step,

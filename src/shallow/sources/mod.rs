@@ -14,7 +14,7 @@ use super::solver::Flow;
 use crate::error::{Error, Result};
 use crate::numeric::checks::{check_within, ensure};
 
-/// A source, a drain or an absorber.
+/// A source, a drain, an orifice or an absorber.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlowPoint {
     /// What it does.
@@ -34,9 +34,9 @@ pub struct FlowPoint {
 pub enum Kind {
     /// Liquid enters.
     Source,
-    /// Liquid leaves, as long as there is some below it.
+    /// Liquid leaves, as long as its columns have some.
     Drain,
-    /// Like a drain, until it has taken this volume (m3): gauze.
+    /// Like a drain, until it has taken this volume (m3), as gauze does.
     Absorber(f64),
     /// A hole in the ground, through which liquid drains under its own weight: Cd a (2 g H)^(1/2) m3/s (Torricelli's law), for the mean
     /// depth H in its circle. The number is Cd a (m2): the hole's area a times its discharge coefficient Cd, 0.6 to 0.65 for a sharp edge.
@@ -160,8 +160,8 @@ impl Flows {
     /// Replaces the flow points; what the previous ones have moved stays in the sums. `which` names a point in an error.
     ///
     /// # Errors
-    /// `Argument`: a number out of range, or a point that has no column within its radius (or two cells): it lies inside solid, or outside
-    /// the domain.
+    /// `Argument`: a number out of range, or a point that has no column within its radius, or within two cells if that is more: it lies
+    /// inside solid, or outside the domain.
     pub fn set(
         &mut self,
         columns: &Columns,
@@ -311,7 +311,7 @@ impl Placed {
             return 0;
         }
         let count = self.columns.len() as f64;
-        // Liquid that finds no room for long is not caught up later.
+        // Liquid that has found no room for a long time does not come later.
         self.pending = self.pending.min(requested.max(MAX_PENDING * count)) + requested;
         let mut share = (self.pending / count).floor().min(1e18) as i64;
         if let Kind::Absorber(capacity) = self.point.kind {

@@ -5,8 +5,8 @@ use crate::error::Result;
 use crate::shallow::system::Shallow;
 
 impl Shallow {
-    /// Pours a volume (m3; negative: takes it) in equal shares into the columns that a source at this position (m) would act on. Each
-    /// column stays between dry and its ceiling; returns what came in (m3).
+    /// Pours a volume (m3; negative: removes it) in equal shares into the columns that a source at this position (m) would act on. Each
+    /// column stays between dry and full; returns the volume that came in (m3).
     ///
     /// # Errors
     /// `Argument`: as [`Shallow::set_flows`] for a source there.
@@ -30,7 +30,7 @@ impl Shallow {
         self.flow_points.move_to(&self.columns, point, at);
     }
 
-    /// As [`Shallow::set_flows`], after the terrain has moved since the points were first set: one that finds no column rests until it
+    /// As [`Shallow::set_flows`], after the terrain has moved since the points were first set: a point that finds no column rests until it
     /// does.
     ///
     /// # Errors

@@ -354,7 +354,7 @@ static void misuse(frz_context *ctx) {
     WORKS(frz_shallow_drops_mesh(ctx, shallow, NULL, &target, &size));
     CHECK(count == 0 && size.vertices == 0 && size.indices == 0);
     for (at = 0; at < 5; ++at) scalars[at] = scalar_of("dye", FRZ_SHALLOW_DYE, 1);
-    FAILS(frz_shallow_set_scalars(shallow, scalars, 5), WRONG, "5 scalars are more than 4");
+    FAILS(frz_shallow_set_scalars(shallow, scalars, 5), WRONG, "5 scalars: at most 4 are allowed");
     FAILS(frz_shallow_set_scalars(shallow, scalars, 2), WRONG, "two scalars have the name");
     scalars[0].name = NULL;
     FAILS(frz_shallow_set_scalars(shallow, scalars, 1), WRONG, "scalar 0: name is NULL");

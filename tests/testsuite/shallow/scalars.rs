@@ -380,7 +380,7 @@ fn wrong_scalars_are_a_sentence() {
     let ctx = context();
     let mut liquid = basin(&ctx, [4, 4], &[Scalar::dye("dye")]);
     let five: Vec<Scalar> = (0..5).map(|at| Scalar::dye(&at.to_string())).collect();
-    assert_eq!(liquid.set_scalars(&five).unwrap_err().to_string(), "5 scalars are more than 4");
+    assert_eq!(liquid.set_scalars(&five).unwrap_err().to_string(), "5 scalars: at most 4 are allowed");
     let twice = [Scalar::dye("dye"), Scalar::dye("dye")];
     assert!(liquid.set_scalars(&twice).unwrap_err().to_string().contains("\"dye\""));
     for (scalar, what) in [

@@ -14,7 +14,7 @@ pub struct LateralFriction {
     pub(super) age: u32,
     /// Whether each row may have pipes with friction during these steps.
     pub(super) rows: Vec<bool>,
-    /// Their active strips.
+    /// The active strips of these rows.
     pub(super) strips: Vec<u32>,
     /// Whether the surroundings of each strip's columns were found.
     pub(super) has_surroundings: Vec<bool>,
@@ -23,7 +23,8 @@ pub struct LateralFriction {
     /// Positions of each strip from which links lead to the east, south, west and north.
     pub(super) linked: Vec<[u16; 4]>,
     pub(super) has_links: bool,
-    /// Across x, then across z: total contact and walls of each column (`surroundings.rs`), contact before it, and contact behind it.
+    /// For pipes to the east, then for pipes to the south: total contact and walls of each column (`surroundings.rs`), contact before it,
+    /// and contact behind it.
     pub(super) surroundings: [[Numbers; 3]; 2],
     pub(super) lines: Lines,
 }
@@ -63,7 +64,7 @@ impl Numbers {
         &mut self.list[self.before..]
     }
 
-    /// A strip of numbers, starting some positions before that of a strip.
+    /// 16 numbers, from `positions` before the first of a strip.
     #[inline(always)]
     pub fn before(&self, strip: usize, positions: usize) -> &[f32; STRIP] {
         let at = self.before + strip * STRIP - positions;

@@ -15,9 +15,9 @@ use crate::shallow::solver::viscous_flux::{Step, min};
 pub struct PipeFriction {
     /// Friction at the ground and at a ceiling, relative to that below a free surface.
     pub ground: f64,
-    /// Lateral friction, as part of the pipe's flux.
+    /// Lateral friction, as a fraction of the pipe's flux.
     pub lateral: f64,
-    /// Flux added by the liquid beside the pipe (units a step).
+    /// Flux added by the liquid beside the pipe (units per step).
     pub dragged: f64,
 }
 

@@ -1,18 +1,18 @@
 //! Lateral friction: of pipes at walls, and between liquids that flow side by side at different speeds.
 //!
-//! With a velocity of u phi(z / H), where phi is the profile of a wide film, momentum along a pipe weighted by phi over the depth
-//! (Galerkin) is
+//! With a velocity of u phi(z / H), where phi is the profile of a wide film, the momentum along a pipe, weighted by phi and integrated over
+//! the depth (Galerkin), gives
 //!
 //! du/dt = g S - k nu u / H^2 + 6/5 nu d2u/dy2
 //!
-//! with k = 3 below a free surface, and 12 below a ceiling: 6/5 is the mean of phi^2, and u is 0 at a wall. The discharge of a closed
-//! square duct is 0.7 % below the exact value (White, *Viscous Fluid Flow*, 3-3.3), that of a channel as deep as wide 2.8 % below; flat
-//! ones are closer.
+//! with k = 3 below a free surface, and 12 below a ceiling; 6/5 is the mean of phi^2, and u is 0 at a wall. The discharge of a closed
+//! square duct is 0.7 % below the exact value (White, *Viscous Fluid Flow*, 3-3.3), that of a channel as deep as it is wide 2.8 % below;
+//! flatter ones are closer.
 //!
 //! Differences in y are between a pipe and those beside it; a wall lies half a cell beyond it. The surroundings of a pipe
 //! (`surroundings.rs`) are the mean of those of the columns at its ends, so that they are the same from either end. All pipes beside each
 //! other form a line along x or z, which is solved at once (`lines.rs`): neither viscosity nor depth limits the step. Films thinner than a
-//! sixteenth of a cell have no lateral friction. Where two rows have only such columns, nothing is computed.
+//! sixteenth of a cell have no lateral friction. Where a row and the next one have only such films, nothing is computed.
 
 mod buffers;
 mod flooded;
@@ -102,7 +102,7 @@ impl LateralFriction {
         self.is_on && self.rows[row]
     }
 
-    /// Fluxes of those rows to the east and to the south (units in this step).
+    /// Fluxes of rows with lateral friction, to the east and to the south (units in this step).
     pub fn solved(&self) -> [&[f32]; 2] {
         self.lines.solved()
     }

@@ -1,8 +1,8 @@
 //! Surroundings of a column across a line: contact with other liquid, and walls.
 //!
 //! Higher ground beyond a side is a wall, up to the liquid's surface. As liquid near the ground moves slowly, the lower part of its depth
-//! counts little: by its part of the profile's mean of phi^2. Where both surfaces differ in height as the ground does, up to a cell's edge,
-//! there is no wall but a slope with a film on it. A dry edge that is not higher causes no friction.
+//! counts little: by its share of the mean of phi^2. Where both surfaces differ in height as the ground does, up to a cell's edge, there is
+//! no wall but a slope with a film on it. A dry edge that is not higher causes no friction.
 
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_from, strip_mut, strip_of};

@@ -20,12 +20,12 @@ pub(in crate::shallow::solver) struct Edge {
     pub at: PipeIndex,
     /// Parties at both ends, or [`NONE`]: outside.
     pub ends: [u32; 2],
-    /// Flux at equal heads, and flux per unit of head difference (units a step).
+    /// Flux at equal heads, and flux per unit of head difference (units per step).
     pub kept: f64,
     pub conductance: f64,
     /// Surface outside (units), where one end is outside.
     pub outside: f64,
-    /// Flux (units a step), and the remainder of its transfer.
+    /// Flux (units per step), and the remainder of its transfer.
     pub flux: f64,
     pub remainder: f64,
     /// Transfer (units).

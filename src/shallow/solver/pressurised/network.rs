@@ -57,7 +57,7 @@ pub struct State<'a> {
     pub pipes: &'a Pipes,
     /// H (units).
     pub depth: &'a [i32],
-    /// Flux to the east and to the south (units a step).
+    /// Flux to the east and to the south (units per step).
     pub flux: [&'a [f32]; 2],
     /// Remainders of transfers, to the east and to the south (units).
     pub remainder: [&'a [f32]; 2],

@@ -7,10 +7,10 @@ use crate::shallow::columns::{Columns, NONE};
 /// Heads closer than this (units) are equal, like surfaces that differ by less than a unit: liquid at rest stays at rest.
 pub(in crate::shallow::solver) const HEAD_TOLERANCE: f64 = 0.5;
 
-/// Regularisation of the diagonal, as part of the conductance: just enough that a closed cavity has a solution.
+/// Regularisation of the diagonal, as a fraction of the conductance: just enough that a closed cavity has a solution.
 pub(in crate::shallow::solver) const REGULARISATION: f64 = 1e-12;
 
-/// Fractions of a unit in which flows through links are summed.
+/// Flows through links are summed in fractions of a unit: a unit is this many.
 pub(in crate::shallow::solver) const LINK_SCALE: f64 = 65536.0;
 
 /// A full column in the system of heads.
@@ -41,7 +41,7 @@ pub(in crate::shallow::solver) fn scaled(number: f64) -> i64 {
     (number * LINK_SCALE).clamp(-1e16, 1e16) as i64
 }
 
-/// The height of a pipe's section (units): the depth of the last donor, within the opening between both columns.
+/// The height of a pipe's section (units): the depth of the last step's donor, at most the height of the opening between both columns.
 pub fn section(columns: &Columns, depth: &[i32], i: usize, j: Option<usize>, flux: f32) -> f64 {
     let (base, ceiling) = (columns.bases(), columns.ceilings());
     let Some(j) = j else { return f64::from(depth[i]) };

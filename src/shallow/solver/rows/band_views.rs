@@ -18,7 +18,7 @@ pub struct Part<'a> {
     pub start: usize,
     /// H (units).
     pub depth: &'a mut [i32],
-    /// Flux to the east and to the south (units a step).
+    /// Flux to the east and to the south (units per step).
     pub flux: [&'a mut [f32]; 2],
     /// Remainders of transfers, to the east and to the south (units).
     pub remainder: [&'a mut [f32]; 2],
@@ -32,7 +32,7 @@ pub struct Part<'a> {
 pub struct LinkPart<'a> {
     /// First link.
     pub first: usize,
-    /// Flux (units a step).
+    /// Flux (units per step).
     pub flux: &'a mut [f32],
     /// Remainder of the transfer (units).
     pub remainder: &'a mut [f32],

@@ -12,7 +12,7 @@ use crate::shallow::solver::full::SLACK;
 use crate::shallow::solver::transfers::scale;
 use crate::shallow::solver::viscous_flux::Step;
 
-/// Minimum columns for a step to be divided among threads: below, starting them takes longer than they save.
+/// Minimum columns for a step to be divided among threads: with fewer, starting the threads takes longer than they save.
 pub const MIN_COLUMNS: usize = 100_000;
 /// Minimum rows of a band, to limit the work that neighbouring bands both do.
 const MIN_ROWS: usize = 32;
@@ -37,7 +37,7 @@ pub struct Bands {
     deepest: Vec<i32>,
     /// Whether columns of each row might fill up to their ceiling in this step.
     may_fill: Vec<bool>,
-    /// The minimum room of the columns of those rows (units).
+    /// The minimum room of the columns of each row (units).
     room: Vec<f32>,
     /// Whether each row might have full columns.
     may_be_full: Vec<bool>,
@@ -116,7 +116,7 @@ impl Bands {
         self.divide(columns, threads);
     }
 
-    /// Measures rows again after their columns have changed.
+    /// Updates what is known of rows whose columns have changed.
     pub fn refit(&mut self, columns: &Columns, pipes: usize, rows: Range<usize>, depth: &[i32]) {
         self.inflow_bound = pipes as i64 + 1;
         for row in rows.clone() {

@@ -1,5 +1,5 @@
-//! A step, row by row: fluxes, their scaling and the new depths follow each other at a distance of a few rows, so that data that one has
-//! read or written is still in the cache for the next (thesis Alg. 4.1, lines 1 to 4).
+//! A step, row by row: fluxes, their scaling and the new depths follow each other at a distance of a few rows, so that data that one stage
+//! has read or written is still in the cache for the next (thesis Alg. 4.1, lines 1 to 4).
 //!
 //! When the front is at row r, the fluxes and K_min of r are computed; with these the pipes of r - 1 can be scaled. Where there are
 //! ceilings, K_max of r - 1 follows, and K_max of r - 2 is refined with the room that outflow makes. The transfers of row r - 3 (r - 1

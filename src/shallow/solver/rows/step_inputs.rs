@@ -63,7 +63,7 @@ pub struct StepResults {
     pub scaled: [u32; 3],
     /// Units that crossed the border.
     pub outside: Outside,
-    /// Strips that became wet.
+    /// Strips that became wet, and resting ones that a transfer changed.
     pub woken: Vec<u32>,
     /// Changes of scalars.
     pub scalar_changes: [Changes; MAX_SCALARS],

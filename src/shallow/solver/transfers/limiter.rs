@@ -1,8 +1,8 @@
 //! Iterative limiter of integer transfers: no column gives more than it has or takes more than it has room for.
 //!
-//! Each round cuts all transfers simultaneously, in integers, so that nothing depends on an order: first to what the donors have, then,
-//! until no column is over, to the receivers' room, including what they give. Each cut makes its columns safer as donors, but may leave
-//! them too little room as receivers; the next round corrects that.
+//! Each round cuts all transfers simultaneously, in integers, so that nothing depends on their order: first to what the donors have, then,
+//! until no column would overflow, to the receivers' room, including what they give. Each cut makes its columns safer as donors, but may
+//! leave them too little room as receivers; the next round corrects that.
 
 use crate::shallow::columns::NONE;
 use crate::shallow::solver::pressurised::edges::Edge;

@@ -192,7 +192,7 @@ fn find_levels(amount: &[f64], depth: &[i32], levels: &mut [f64]) {
 }
 
 /// Applies amounts that move to the east, from the west, to the south and from the north. Removes what remains in columns that ran dry, at
-/// most half of the smallest amount for each pipe, and returns its sum.
+/// most half a unit of amount for each pipe, and returns its sum.
 fn move_amounts(around: &[&[f64]; 4], depth: &[i32], amount: &mut [f64]) -> i64 {
     return dispatch!(body(around: &[&[f64]; 4], depth: &[i32], amount: &mut [f64]) -> i64);
 

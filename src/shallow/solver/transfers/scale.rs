@@ -1,8 +1,8 @@
 //! Scaling of transfers, so that no column gives more than it has or takes more than it has room for (thesis 4.1.1, K_min and K_max).
 //!
 //! A pipe's transfer is multiplied by K_min of the donor and K_max of the receiver: what leaves one column arrives in the other. K_max
-//! depends on the outflow of its column in the same step, which depends on the K_max of others: it is found in sweeps, from below, so that
-//! it is safe after each.
+//! depends on the outflow of its column in the same step, which depends on the K_max of others: it is found in sweeps that start from a
+//! safe value and only raise it, so that it is safe after each.
 
 use crate::shallow::columns::{STRIP, strip_from, strip_mut, strip_of};
 use crate::shallow::solver::viscous_flux::{max, min};

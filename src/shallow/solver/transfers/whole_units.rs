@@ -1,6 +1,6 @@
 //! Transfers through pipes in whole units (thesis Eq. 4.2); the remainder is kept for the next step.
 //!
-//! Without remainders thin films freeze: blood of 1 um on a slope of 0.5 moves 0.03 units a step.
+//! Without remainders thin films freeze: a film of blood 1 um thick on a slope of 0.5 moves 0.03 units per step.
 
 use super::scale::Around;
 use crate::numeric::cpu::dispatch;
@@ -65,7 +65,7 @@ pub fn find_moved_amounts(own: &[f64], other: &[f64], transfer: &[f32], moved: &
         for (((moved, own), other), transfer) in moved.iter_mut().zip(own).zip(other).zip(transfer) {
             // SAFETY: it was scaled by K, as for its whole units.
             let units = unsafe { whole(*transfer) };
-            // One of both is 0. Selecting one of two concentrations would make the compiler gather them.
+            // One of the two is 0. Selecting one of two concentrations would make the compiler gather them.
             let (goes, comes) = (f64::from(units.max(0)), f64::from(units.min(0)));
             *moved = nearest(own * goes + other * comes);
         }
