@@ -247,7 +247,7 @@ pub const GATES: &[Gate] = &[
     gate("snow.mist.mass_drift", "%", Most(5.0), Most(1.0)),
     gate("snow.mist.padding", "%", Most(1.0), Most(0.2)),
     gate("snow.mist.dashes", "1", Most(0.0), Open),
-    // The same at 24, 48 and 96 frames a second: mass, density and momentum; and eddies that change, not only move.
+    // The same at 24, 48 and 96 frames per second: mass, density and momentum; and eddies that change, not only move.
     gate("snow.mist.frame_rate", "%", Most(3.0), Open),
     yes("snow.mist.turbulence_decorrelates"),
     // Solids that move through mist, and a pocket that they close.

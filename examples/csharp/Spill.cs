@@ -1,5 +1,5 @@
-/* A cup of coffee with milk is spilled over a table with a groove, and falls over its edge: frazil's core library from C#, as a game has it. 60
- * frames a second; the surface, with the share of milk in each vertex, and the drops in the air come as Unity takes them (Y up, left-handed, clockwise)
+/* A cup of coffee with milk is spilled over a table with a groove, and falls over its edge: frazil's core library from C#, as in a game, at 60
+ * frames per second; the surface, with the share of milk in each vertex, and the drops in the air come as Unity takes them (Y up, left-handed, clockwise)
  * into arrays that are allocated once.
  *
  *   mcs -optimize -out:spill.exe Spill.cs && LD_LIBRARY_PATH=PREFIX/lib mono spill.exe

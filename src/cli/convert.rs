@@ -41,13 +41,13 @@ pub struct Args {
     /// Frames of a sequence or a character.
     #[arg(long, value_name = "A-B|A-BxN", allow_hyphen_values = true)]
     frames: Option<FrameChoice>,
-    /// Frames a second.
+    /// Frames per second.
     #[arg(long, default_value = "24", value_parser = positive)]
     fps: f64,
     /// A character's clip; it begins at the first of --frames.
     #[arg(long, value_name = "NAME")]
     clip: Option<String>,
-    /// Only nodes of this name of a character, and their descendants; * stands for any letters.
+    /// Only nodes of this name of a character, and their descendants; * matches any characters, ? exactly one.
     #[arg(long, value_name = "NAME")]
     node: Option<String>,
     #[command(flatten)]
@@ -58,7 +58,7 @@ pub struct Args {
     /// Factor from metres to the output's unit.
     #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = positive)]
     to_scale: f64,
-    /// Edge of the voxels of points in a .vdb (m) [default: as the .ply of points says].
+    /// Edge of the voxels of a .vdb of points (m) [default: the size given in the input file].
     #[arg(long, value_name = "M", value_parser = positive)]
     voxel: Option<f64>,
 }
@@ -230,7 +230,10 @@ impl Losses<'_> {
             log::warn!("{}: arrays are not carried over: {}", input.display(), names.join(", "));
         }
         if to == "usda" && self.is_sequence && vectors(&arrays, VELOCITY).is_some() {
-            log::warn!("{}: its velocities give way to those from frame to frame", input.display());
+            log::warn!(
+                "{}: its velocities are replaced by those computed from each frame to the next",
+                input.display()
+            );
         }
         let vectors = vector_stems(&arrays);
         if !vectors.is_empty() && !self.keeps_space && ["ply", "usda"].contains(&to.as_str()) {
@@ -373,7 +376,9 @@ impl Args {
                 let motion = Placed::new(character, self.space.space(), Keys::default());
                 Ok((Source::One(Box::new(motion)), frames))
             }
-            None if self.frames.is_some() => Err(Failure::refused("--frames is of no use with one mesh")),
+            None if self.frames.is_some() => {
+                Err(Failure::refused("--frames cannot be used with a single mesh"))
+            }
             None => Ok((Source::One(self.static_mesh(&self.input).or_refuse()?), one_frame())),
             Some(pattern) => {
                 let frames = self.frames.clone().ok_or_else(|| needs_frames(&self.input))?;

@@ -40,7 +40,7 @@ impl FrameResults {
     /// Counts a frame; returns its result, or none if it failed.
     ///
     /// # Errors
-    /// Errors that every other frame would have too: cancel; an argument or a memory limit that is refused before any frame is made.
+    /// Errors that every other frame would have too: cancel; an invalid argument or an exceeded memory limit, before any frame is made.
     pub fn record<T>(&mut self, frame: i32, result: Result<T>) -> std::result::Result<Option<T>, Failure> {
         match result {
             Ok(done) => {

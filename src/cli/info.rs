@@ -104,7 +104,7 @@ fn character(path: &Path, origin: &Origin) -> frazil::Result<Vec<Value>> {
 /// Maximum number of nodes listed in one line.
 const MAX_NODES_IN_LINE: usize = 6;
 
-/// How the lowest parts of a clip move while they stand (in the file's unit, Y up).
+/// How the lowest parts of a character move in a clip while they stand (in the file's unit, Y up).
 fn clip_gait(path: &Path, clip: &str, seconds: f64) -> frazil::Result<Value> {
     let play = Play { clip: Some(clip.into()), repeat: false, ..Play::default() };
     let Some(gait) = gait(&Character::open(path, play)?, 0.0, seconds)? else {
@@ -115,7 +115,7 @@ fn clip_gait(path: &Path, clip: &str, seconds: f64) -> frazil::Result<Value> {
         "stands where it is: no keys are needed".to_string()
     } else if gait.is_steady() {
         format!(
-            "carry it by [{:.3}, 0, {:.3}] a round of {seconds:.3} s ({speed:.3} a second), or its feet slip",
+            "move it by [{:.3}, 0, {:.3}] in each cycle of {seconds:.3} s ({speed:.3} per second), or its feet slip",
             carry.x * seconds,
             carry.z * seconds
         )

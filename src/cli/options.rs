@@ -36,9 +36,9 @@ pub struct Origin {
 /// An upward axis.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Axis {
-    /// As frazil, Houdini, Maya.
+    /// As in frazil, Houdini, Maya.
     Y,
-    /// As Blender, 3ds Max.
+    /// As in Blender, 3ds Max.
     Z,
 }
 

@@ -41,7 +41,7 @@ pub fn refuse_input<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a Path>)
     let is_output = |input: &&Path| std::fs::canonicalize(input).is_ok_and(|input| input == output);
     match inputs.into_iter().find(is_output) {
         Some(_) if output.is_file() => {
-            Err(Error::file(path, "is an input too and would be written over: choose another output"))
+            Err(Error::file(path, "is an input too and would be overwritten: choose another output"))
         }
         _ => Ok(()),
     }

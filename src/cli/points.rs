@@ -98,7 +98,7 @@ pub struct Conversion<'a> {
     pub output: &'a Path,
     /// Frames of patterns.
     pub frames: Option<&'a FrameChoice>,
-    /// Frames a second.
+    /// Frames per second.
     pub fps: f64,
     /// Edge of a voxel (m).
     pub voxel: Option<f64>,
@@ -123,7 +123,7 @@ impl Conversion<'_> {
             return Err(needs_frames(self.input));
         }
         if !is_sequence && self.frames.is_some_and(|frames| frames.count() > 1) {
-            return Err(Failure::refused("several --frames are of no use with one file of points"));
+            return Err(Failure::refused("several --frames cannot be used with a single file of points"));
         }
         let frames = self.frames.cloned().unwrap_or_else(one_frame);
         refuse_one_file(self.output, &frames, "grains.%04d.ply")?;

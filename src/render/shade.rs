@@ -20,7 +20,7 @@ pub struct Light {
     pub sun: DVec3,
 }
 
-/// Radiance of the sun on a surface that faces it.
+/// Radiance of a white surface that faces the sun.
 pub(super) const SUN: Colour = Colour::new(1.75, 1.52, 1.22);
 /// Radiance of the zenith and of the horizon.
 const ZENITH: Colour = Colour::new(0.20, 0.30, 0.48);
@@ -67,7 +67,7 @@ fn sky(height: f64) -> Colour {
 /// Light that leaves a point towards the camera.
 ///
 /// `blocked(direction)` returns whether something blocks that direction from the point, `transmittance(direction)` the share of sunlight
-/// that the fog transmits, 0 to 1. `sample` numbers the samples of this pixel; `wrap` is as in `Hit`, 0 to 1.
+/// that the fog transmits, 0 to 1. `sample` is the index of the sample in its pixel; `wrap` is as in [`Hit`](super::model::Hit).
 pub(super) fn shade(
     light: &Light,
     normal: DVec3,
@@ -86,7 +86,7 @@ pub(super) fn shade(
     let (tangent, bitangent) = tangents(normal);
     let mut fill = Colour::zeros();
     for ray in 0..SKY_RAYS {
-        // Directions with density cos / pi: their mean is the light of the sky on the surface.
+        // Directions are distributed with density cos / pi, so that the mean of their light is what the surface receives from the sky.
         let (x, y) = disc(sample * SKY_RAYS + ray);
         let toward = tangent * x + bitangent * y + normal * (1.0 - x * x - y * y).max(0.0).sqrt();
         let is_open = toward.y > -0.05 && !blocked(toward);
@@ -116,7 +116,7 @@ pub(super) fn gloss(
     (share, sky * share + sun)
 }
 
-/// A point of the unit disc: the plastic sequence (Roberts 2018), the same at each pixel, so that flat walls stay flat.
+/// A point of the unit disc, from the plastic sequence (Roberts 2018). All pixels use the same points, so that flat walls show no noise.
 fn disc(index: usize) -> (f64, f64) {
     const PLASTIC: f64 = 1.324_717_957_244_746;
     static POINTS: LazyLock<[(f64, f64); DISC_POINTS]> = LazyLock::new(|| {

@@ -7,8 +7,8 @@ use crate::geometry::DVec3;
 const CELL: f64 = 2.5;
 /// Maximum number of cells: the starts of their lists take 64 MB.
 const MAX_CELLS: f64 = 16.0e6;
-/// Spheres nearer than this (their radii) cast no shadow: light that enters snow leaves it about that far away, so the grains of a smooth
-/// heap do not shade each other.
+/// Spheres nearer than this (in their radii) cast no shadow: light that enters snow leaves it about that far away, so the grains of a
+/// smooth heap do not shade each other.
 const MIN_DISTANCE: f64 = 1.5;
 
 /// Spheres as shadow casters, in a grid of cells.

@@ -97,7 +97,7 @@ fn value_range(ctx: &Context, grid: &FloatGrid) -> Result<[f32; 2]> {
     Ok(range)
 }
 
-/// Minimum and maximum corner of the active voxels of a grid (m); none without any.
+/// Minimum and maximum corner of the active voxels of a grid (m); none if no voxel is active.
 fn bounds_of(grid: &FloatGrid) -> Option<(DVec3, DVec3)> {
     let (low, high) = grid.active_bbox()?;
     let bounds =

@@ -7,10 +7,10 @@ pub(super) mod ffi {
         x: i32,
         y: i32,
         z: i32,
-        /// Whether `values` and `mask` are set; otherwise the fields of the tile are.
+        /// Whether `values` and `mask` are set; if not, `tile_active` and `tile` are.
         is_leaf: bool,
         tile_active: bool,
-        /// For floats, the first number.
+        /// A grid of floats uses only the first number.
         tile: [f32; 3],
         values: usize,
         mask: usize,
@@ -49,7 +49,7 @@ pub(super) mod ffi {
         /// 1 for a tile of 8 voxels along an edge, 2 for 128, 3 for 4096.
         level: u32,
         active: bool,
-        /// For floats, the first number.
+        /// A grid of floats uses only the first number.
         value: [f32; 3],
     }
 

@@ -198,7 +198,7 @@ pub fn intersection_copy(ctx: &Context, a: &FloatGrid, b: &FloatGrid) -> Result<
 }
 
 /// Moves the surface outward by `metres` (inward if negative). Beyond the band the surface is moved in steps; the first-order scheme loses
-/// about a tenth of the distance in each, the other hardly anything.
+/// about a tenth of the distance in each step, WENO hardly anything.
 ///
 /// # Errors
 /// The first-order scheme beyond the narrow band; cancel, or what OpenVDB reports.

@@ -123,7 +123,7 @@ fn reassign_voxels(points: &mut Points, head: &ffi::PointsHead) -> std::result::
     if !head.is_linear {
         return Err(format!("grid \"{}\" has points in a space that is not linear", head.name));
     }
-    // Row vectors are multiplied from the left: element (row, column) is at 4 x row + column.
+    // Row vectors stand on the left of the matrix: element (row, column) is at 4 x row + column.
     let m = &head.to_world;
     let identity = |n: usize| match n {
         0 | 5 | 10 => head.voxel,

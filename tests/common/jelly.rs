@@ -15,7 +15,7 @@ use super::shapes::globe;
 
 /// Frames of the shot, from 1 on.
 pub const FRAMES: i32 = 36;
-/// Frames a second.
+/// Frames per second.
 const FPS: f64 = 24.0;
 /// Radius of the ball (m).
 const RADIUS: f64 = 0.2;

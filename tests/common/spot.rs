@@ -11,7 +11,7 @@ use super::character::data;
 
 /// Its frames.
 pub const FRAMES: i32 = 41;
-/// Frames a second.
+/// Frames per second.
 pub const FPS: f64 = 25.0;
 /// The initial distance of its particles (m).
 pub const SPACING: f64 = 0.008_620_6;

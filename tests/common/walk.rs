@@ -16,7 +16,7 @@ pub struct Step {
     pub turn_deg: [f64; 3],
 }
 
-/// Frames of a stride (two steps), at 24 frames a second.
+/// Frames of a stride (two steps), at 24 frames per second.
 const STRIDE_FRAMES: f64 = 26.0;
 /// Length of a stride (m).
 const STRIDE: f64 = 1.3;

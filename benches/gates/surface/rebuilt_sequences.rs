@@ -11,11 +11,11 @@ use crate::common::spot;
 
 /// Edge of a cell (spacings).
 pub const CELL: f64 = 0.5;
-/// Initial distance between particles (m), frames and frames a second of the dam break.
+/// Initial distance between particles (m), frames and frames per second of the dam break.
 const DAM_SPACING: f64 = 0.0332;
 const DAM_FRAMES: usize = 31;
 const DAM_FPS: f64 = 25.0;
-/// Initial distance between particles (m) and frames a second of the made sets.
+/// Initial distance between particles (m) and frames per second of the made sets.
 const SPACING: f64 = 0.01;
 const FPS: f64 = 24.0;
 /// Frames of each made set. The balls pass through each other from frame 47 on, and the bubble's particles pile up in its middle from
@@ -44,7 +44,7 @@ pub struct Sequence {
 }
 
 impl Sequence {
-    /// One with 24 frames a second, from frame 0 on.
+    /// One with 24 frames per second, from frame 0 on.
     fn new(
         name: &'static str,
         spacing: f64,

@@ -18,7 +18,7 @@ use crate::common::shapes::globe;
 const SPACING: f64 = 0.0125;
 /// Frames of the shot, from 1 on.
 const FRAMES: i32 = 32;
-/// Frames a second.
+/// Frames per second.
 const FPS: f64 = 24.0;
 /// Radii of the ball, of the drop, and of the neck between them.
 const BALL: f64 = 8.0;

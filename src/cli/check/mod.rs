@@ -16,9 +16,9 @@ use serde::Serialize;
 use super::output;
 use super::session::{Failure, OrFailure, Session};
 
-/// Read every input of every frame of a scene, and print its sizes, memory and disk; nothing is computed.
+/// Read every input of every frame of a scene, and print sizes, memory and disk; simulates nothing.
 ///
-/// For an output folder: read every file that a run wrote there, and name those that are not what was written.
+/// For an output folder: read every file that a run wrote there, and name those that are damaged or missing.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  frazil check walker.toml -o cache/\n  frazil check cache/")]
 pub struct Args {
@@ -66,7 +66,7 @@ fn refuse_preview(args: &Args, table: &str) -> Result<(), Failure> {
 fn frames_in_words([first, last]: [i32; 2], fps: f64) -> String {
     let count = i64::from(last) - i64::from(first) + 1;
     let seconds = count as f64 / fps;
-    format!("frames    {first}-{last}: {count}, {seconds:.2} s at {fps} a second\n")
+    format!("frames    {first}-{last}: {count}, {seconds:.2} s at {fps} frames per second\n")
 }
 
 /// The free space, if it is known.
@@ -78,7 +78,7 @@ fn warnings_in_words(warnings: &[String]) -> String {
     warnings.iter().map(|warning| format!("warning   {warning}\n")).collect()
 }
 
-/// Warns if the files need more than the free space; `how` is the verb, as "need about".
+/// Warns if the files need more than the free space; `how` is the verb, such as "need about".
 fn warn_of_space(warnings: &mut Vec<String>, how: &str, needed: Option<u64>, free: Option<u64>) {
     if let (Some(needed), Some(free)) = (needed, free)
         && needed > free
@@ -115,7 +115,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 /// Compares an output folder with what was written into it.
 fn check_folder(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.output.is_some() || !args.set.is_empty() || args.preview.is_some() {
-        return Err(Failure::refused("-o, --set and --preview are of no use with an output folder"));
+        return Err(Failure::refused("-o, --set and --preview cannot be used with an output folder"));
     }
     let verified = verify(&session.ctx, &args.scene).or_refuse()?;
     print(args, &verified, || verified_in_words(&verified))?;
@@ -139,7 +139,7 @@ fn verified_in_words(verified: &Verified) -> String {
         let _ = writeln!(out, "unknown   {file}: no record names it");
     });
     if verified.damaged.is_empty() {
-        out.push_str("all of them are what was written\n");
+        out.push_str("all of them are as they were written\n");
     }
     out
 }

@@ -60,7 +60,7 @@ fn describe_grains(out: &mut String, report: &Report) {
     let Some(grains) = &report.grains else {
         if report.settings.contains_key("grains.radius") {
             out.push_str(
-                "grains    how many is known when the base is there: make it, then check with -o DIR\n",
+                "grains    how many is known when the base exists: make it, then check with -o DIR\n",
             );
         }
         return;
@@ -68,7 +68,7 @@ fn describe_grains(out: &mut String, report: &Report) {
     let (removed, share) = (grains.removed_m3, grains.compression);
     let upto = match (grains.to_frame, report.frames[1]) {
         (frame, last) if frame == last => String::new(),
-        (frame, last) => format!(" up to frame {frame} of {last}, as far as the base is there"),
+        (frame, last) => format!(" up to frame {frame} of {last}, as far as the base exists"),
     };
     let _ = writeln!(out, "grains    {}{upto}", grains.count());
     let _ = writeln!(out, "          from {removed:.6} m3 of the base, compression {share}");
@@ -143,7 +143,7 @@ fn describe_object(out: &mut String, report: &Report, object: &ObjectReport) {
         let speed = walk.stride_m / walk.round_s;
         let _ = writeln!(
             out,
-            "          walks at {speed:.2} m/s, {:.2} m a round of {:.2} s; its feet slip at {:.2} m/s",
+            "          walks at {speed:.2} m/s, {:.2} m in each cycle of {:.2} s; its feet slip at {:.2} m/s",
             walk.stride_m, walk.round_s, walk.slips_m_per_s
         );
     }

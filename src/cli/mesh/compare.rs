@@ -30,14 +30,14 @@ Examples:
 pub struct Args {
     /// Mesh (.obj, .ply, .stl), character at rest (.glb, .gltf), or a sequence of meshes (a.%04d.ply).
     a: PathBuf,
-    /// The mesh to compare with, as A; a single file is compared with every frame.
+    /// The mesh to compare A with, of the same kinds; a single file is compared with every frame.
     #[arg(required_unless_present = "flicker")]
     b: Option<PathBuf>,
     /// Frames of sequences.
     #[arg(long, value_name = "A-B|A-BxN|A,B,C", allow_hyphen_values = true)]
     frames: Option<FrameChoice>,
-    /// For each sequence also the second differences of its vertices' positions over three frames, x(n-1) - 2 x(n) + x(n+1) (m): the
-    /// trembling that a still camera sees.
+    /// Also report for each sequence the second differences of its vertices' positions over three frames, x(n-1) - 2 x(n) + x(n+1)
+    /// (m): the trembling that a still camera sees.
     #[arg(long)]
     flicker: bool,
     #[command(flatten)]
@@ -56,8 +56,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 }
 
 /// Printed if the faces of a sequence change.
-const CHANGED: &str = "where faces change between two frames no vertex can be followed and the surface's own motion cannot be taken \
-                       off: the distances between the two surfaces are given there instead";
+const CHANGED: &str = "where faces change between two frames, no vertex can be followed and the surface's own motion cannot be \
+                       subtracted: the distances between the two surfaces are given there instead";
 
 impl Args {
     fn paths(&self) -> impl Iterator<Item = &PathBuf> {
@@ -78,7 +78,7 @@ impl Args {
         let frames: Vec<i32> = match (sequence, &self.frames) {
             (Some(_), Some(frames)) => frames.iter().collect(),
             (Some(path), None) => {
-                return Err(Failure::of_file(path, "is of many frames: choose them with --frames A-B"));
+                return Err(Failure::of_file(path, "holds many frames: choose them with --frames A-B"));
             }
             (None, Some(_)) => {
                 return refused("--frames is for sequences such as a.%04d.ply, and none is given");
@@ -253,7 +253,7 @@ impl Comparison {
         let (areas, volumes) = (difference(self.areas), difference(self.volumes));
         let vertices = match &self.vertices {
             Some(found) => format!("the same faces; from vertex to vertex {}", in_words(found)),
-            None => "other faces, or in another order".to_string(),
+            None => "different faces, or in a different order".to_string(),
         };
         format!(
             "{a}: area {area:.6} m2, volume {volume:.6} m3\n\
@@ -447,7 +447,7 @@ impl Step {
         match self {
             Self::Vertices(frame, found) => format!("flicker around frame {frame}: {}", in_words(found)),
             Self::Surfaces([from, to], distances) => format!(
-                "frames {from} and {to} have other faces: there {}; back {}",
+                "frames {from} and {to} have different faces: forward {}; back {}",
                 in_words(&distances.to),
                 in_words(&distances.back)
             ),

@@ -246,10 +246,10 @@ const TRIANGLES: Nouns<11> = [
         "vertices on open edges within rounding of others: joined",
     ],
     [
-        "vertex on an open edge within rounding of others: which of them it is is not clear",
-        "vertices on open edges within rounding of others: which of them are one is not clear",
+        "vertex on an open edge within rounding of others: it is not clear to which it belongs",
+        "vertices on open edges within rounding of others: it is not clear which belong together",
     ],
-    ["vertex that no triangle names: ignored", "vertices that no triangle names: ignored"],
+    ["vertex that no triangle refers to: ignored", "vertices that no triangle refers to: ignored"],
 ];
 
 /// A mesh as text: what it is, then only the faults that it has.

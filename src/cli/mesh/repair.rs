@@ -23,8 +23,8 @@ use crate::cli::session::{Failure, OrFailure, Session};
 /// Make solids of meshes that are open, intersect themselves, or are inside out in parts.
 ///
 /// With each part turned outward, the solid is the set of points inside at least one part: overlapping parts become one, and cavities
-/// are filled. The mesh is rebuilt in the cells of a grid where it is faulty; all other triangles stay as they are, with all that they
-/// carry. The output is in metres, with Y up.
+/// are filled. The mesh is rebuilt in the cells of a grid where it is faulty; all other triangles stay as they are, with their
+/// attributes. The output is in metres, with Y up.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -43,7 +43,7 @@ pub struct Args {
     /// Frames of a sequence; each mesh is repaired by itself.
     #[arg(long, value_name = "A-B|A-BxN", allow_hyphen_values = true)]
     frames: Option<FrameChoice>,
-    /// Frames a second, for .usda.
+    /// Frames per second, for .usda.
     #[arg(long, default_value = "24", value_parser = positive)]
     fps: f64,
     #[command(flatten)]
@@ -130,7 +130,7 @@ fn warning(repaired: &Repaired) -> Option<String> {
     let report = &repaired.report;
     let count = report.prepared.ambiguous_vertices;
     let unclear = format!(
-        "{count} corners on open edges lie within rounding of others, but which of them are one is not clear: they are left as they are"
+        "{count} corners on open edges lie within rounding of others, but it is not clear which belong together: they are left as they are"
     );
     let all: Vec<String> =
         (count > 0).then_some(unclear).into_iter().chain(report.losses.warning(report.cell)).collect();
@@ -198,7 +198,7 @@ impl Args {
             (Some(_), Some(frames)) => {
                 refuse_one_file(&self.output, frames, "solid.%04d.ply").map(|()| frames.clone())
             }
-            (None, Some(_)) => Err(Failure::refused("--frames is of no use with one mesh")),
+            (None, Some(_)) => Err(Failure::refused("--frames cannot be used with a single mesh")),
             (None, None) => Ok(one_frame()),
         }
     }

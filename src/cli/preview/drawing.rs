@@ -163,7 +163,7 @@ impl Look {
             let [low, high] = [bounds.0, bounds.1].map(|corner| corner[plane.axis]);
             if !(low..=high).contains(&plane.at) {
                 let there = format!("which lies between {low:.6} and {high:.6} m");
-                return Err(Failure::refused(format!("--cut {plane} is beside what is drawn, {there}")));
+                return Err(Failure::refused(format!("--cut {plane} misses what is drawn, {there}")));
             }
         }
         let camera = self.camera.unwrap_or_else(|| match self.cut {

@@ -32,8 +32,8 @@ pub struct Flipbook<'a> {
 }
 
 impl<'a> Flipbook<'a> {
-    /// Chooses the camera for some frames, ascending, at least one, so that all of the first, the middle and the last one is in the
-    /// picture. For one of them that cannot be drawn, the nearest later frame is used, or else an earlier one.
+    /// Chooses the camera for some frames, ascending, at least one, so that everything in the first, the middle and the last one is in
+    /// the picture. If one of these cannot be drawn, the nearest later frame is used in its place, or else an earlier one.
     ///
     /// # Errors
     /// No frame that can be drawn; nothing to draw; cancel.
@@ -94,8 +94,8 @@ impl<'a> Flipbook<'a> {
         results.finish()
     }
 
-    /// Writes a GIF file atomically that plays `fps` frames of the shot a second. Instead of a frame that cannot be drawn, the one before
-    /// it is shown longer.
+    /// Writes a GIF file atomically that plays `fps` frames of the shot per second. Instead of a frame that cannot be drawn, the
+    /// previous one is shown longer.
     ///
     /// # Errors
     /// Frames that cannot be drawn; a file that cannot be written; cancel.

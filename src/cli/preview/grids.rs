@@ -6,7 +6,7 @@ use super::parts::Part;
 use frazil::scene::{changes_since, partial};
 use frazil::vdb::{file, points};
 
-/// Name of the fog volume that represents a file: others beside it are temperatures, fuels and the like.
+/// Name of the fog volume to draw: other fog volumes in the same file are temperatures, fuels and the like.
 const DENSITY: &str = "density";
 
 /// Reads the first level set of a file; else its fog: the grid called "density", else all fog volumes, else its first grid

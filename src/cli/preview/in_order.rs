@@ -10,8 +10,8 @@ use frazil::{Error, Result};
 /// A frame to be made: its index, and the channel for its result.
 type Job<T> = (usize, Sender<Result<T>>);
 
-/// Makes frames 0 to `count` on several threads. `read` is called for one frame after the other, `make` for several at once, on
-/// the thread that read them, and `take` with their results in order on the caller's thread. At most one frame more
+/// Makes frames 0 to `count` - 1 on several threads. `read` is called for one frame after the other, `make` for several at once,
+/// each on the thread that read it, and `take` with their results in order on the caller's thread. At most one frame more
 /// than there are threads is in flight.
 ///
 /// # Errors

@@ -53,9 +53,9 @@ pub struct Args {
     /// Scalar that tints a liquid, from clear water at 0 to blood, paint, honey, milk or coffee at 1.
     #[arg(long, value_name = "NAME=LIQUID", conflicts_with = "color")]
     tint: Option<Tint>,
-    /// Draw only a plane across an axis at a position (m), seen from the axis' end: the first grid in colours from
-    /// dark blue to pale yellow, for a level set from the inner end of its narrow band to the outer, for any other from the minimum of
-    /// its values and 0 to the maximum (-v prints both), level sets as white lines and meshes as black ones; points are left out.
+    /// Draw only a plane across an axis at a position (m), seen from the axis' end. The first grid has colours from dark blue to pale
+    /// yellow: for a level set from the inner end of its narrow band to the outer, for any other from the minimum to the maximum of
+    /// its values and 0 (-v prints both). Level sets are drawn as white lines, meshes as black ones; points are left out.
     #[arg(long, value_name = "AXIS=M", value_parser = plane, conflicts_with_all = ["color", "tint", "sun", "fog_density"])]
     cut: Option<Plane>,
     /// Clip that characters play [default: they are at rest, or play their only clip with --frame].
@@ -67,7 +67,7 @@ pub struct Args {
     /// Frames of a flipbook [default: all of a shot, if the output is a pattern or a .gif].
     #[arg(long, value_name = "A-B|A-BxN|A,B,C", allow_hyphen_values = true)]
     frames: Option<FrameChoice>,
-    /// Frames a second [default: as the shot's scene says, else 24].
+    /// Frames per second [default: as in the shot's scene, else 24].
     #[arg(long, value_name = "N", value_parser = options::positive)]
     fps: Option<f64>,
     /// Extinction of a fog of density 1 (1/m), if its file does not give it (frazil:density_scale).
@@ -227,7 +227,7 @@ impl Args {
 }
 
 impl Job {
-    /// Refuses frames that a shot lacks, a drawing for which no frame of a sequence exists, and a folder that cannot take pictures.
+    /// Refuses frames that a shot lacks, frames of which a sequence has none, and an output that cannot be written.
     fn check(&self, sources: &Sources) -> frazil::Result<()> {
         let (first, frames) = match self {
             Self::Still(frame, path) => (path.clone(), vec![*frame]),

@@ -49,7 +49,7 @@ pub trait Folder: Send {
     /// Reads the contents of a frame. If frames are read in ascending order, each needs only one file of each stage.
     ///
     /// # Errors
-    /// A file that cannot be read or that is not what was written; cancel.
+    /// A file that cannot be read or that differs from what was written; cancel.
     fn read(&mut self, ctx: &Context, frame: i32) -> Result<Vec<Part>>;
 
     /// Refuses a frame that one of its stages lacks.
@@ -63,7 +63,7 @@ pub trait Folder: Send {
         }
         let (count, first, last) = (frames.len(), frames[0], frames[frames.len() - 1]);
         let what = format!(
-            "frame {frame} is not there: the folder holds {count} frames, {first} to {last}, of {}",
+            "frame {frame} does not exist: the folder holds {count} frames, {first} to {last}, of {}",
             self.stages().join(" and ")
         );
         Err(Error::file(self.path(), what))

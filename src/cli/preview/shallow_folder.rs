@@ -28,7 +28,7 @@ pub struct ShallowFolder {
 }
 
 impl ShallowFolder {
-    /// Opens a folder; none if it has no such frames.
+    /// Opens a folder; none if it has no frames of a liquid.
     ///
     /// # Errors
     /// Records that cannot be read.
@@ -91,7 +91,7 @@ impl Folder for ShallowFolder {
     fn fps(&self) -> Result<f64> {
         let fps = self.scene.as_ref().map(|scene| scene.shot().fps);
         fps.ok_or_else(|| {
-            let what = "has no scene.toml that can be read; --fps says how many frames a second there are";
+            let what = "has no scene.toml that can be read: give the frame rate with --fps";
             Error::file(&self.folder, what)
         })
     }

@@ -50,8 +50,7 @@ impl ShotFolder {
         let frames = frames_of_all(&files);
         if frames.is_empty() {
             let names = STAGES.map(|(name, _)| name).join(", ");
-            let what =
-                format!("is no folder of a shot that has frames to draw of one of its stages ({names})");
+            let what = format!("is not the folder of a shot with frames to draw from its stages ({names})");
             return Err(Error::file(folder, what));
         }
         Ok(Self { folder: folder.to_path_buf(), base, grains, mist, objects, surface, files, frames })
@@ -86,9 +85,7 @@ impl Folder for ShotFolder {
     fn fps(&self) -> Result<f64> {
         let scene = Scene::read(&self.folder.join("scene.toml"));
         let fps = scene.map(|scene| scene.shot().fps);
-        fps.map_err(|error| {
-            Error::argument(format!("{error}; --fps says how many frames a second there are"))
-        })
+        fps.map_err(|error| Error::argument(format!("{error}; give the frame rate with --fps")))
     }
 
     fn read(&mut self, ctx: &Context, frame: i32) -> Result<Vec<Part>> {

@@ -29,11 +29,11 @@ pub struct Sources {
     fps: Option<f64>,
 }
 
-/// Frames a second if neither the user nor a shot gives them.
+/// Frame rate (frames per second) if neither the user nor a shot gives one.
 const DEFAULT_FPS: f64 = 24.0;
 
 impl Sources {
-    /// Opens files, patterns of sequences and folders of shots. Characters play `clip`; without it their only one.
+    /// Opens files, patterns of sequences and folders of shots. Characters play `clip`, or without it their only clip.
     ///
     /// # Errors
     /// A folder that is not a shot's, or whose records cannot be read.
@@ -42,7 +42,7 @@ impl Sources {
         Ok(Self { all, clip, fps })
     }
 
-    /// Frames a second: the user's, else those of the first shot, else 24.
+    /// Frames per second: as the user gives it, else as in the first shot, else 24.
     ///
     /// # Errors
     /// A shot's scene that cannot be read.
@@ -72,7 +72,7 @@ impl Sources {
         self.all.iter().any(|source| matches!(source, Source::File(path) if is_gltf(path)))
     }
 
-    /// Refuses a frame that a sequence or a shot lacks, or a missing frame number if one is needed.
+    /// Refuses a frame that a sequence or a shot does not have; refuses `None` if there is a sequence or a shot.
     ///
     /// # Errors
     /// Names what is missing.
@@ -89,7 +89,7 @@ impl Sources {
         shots.into_iter().try_for_each(|source| source.refuse_missing(frame))
     }
 
-    /// Reads the inputs at a frame; in ascending order, each frame of a shot reads one file.
+    /// Reads the inputs at a frame. If frames are read in ascending order, each frame of a shot needs only one file of each stage.
     ///
     /// # Errors
     /// A file that cannot be read; cancel.
@@ -127,12 +127,12 @@ impl Source {
         Ok(Pattern::parse(path).map_or_else(|| Self::File(path.to_path_buf()), Self::Sequence))
     }
 
-    /// Frames a second, of a shot.
+    /// Frames per second of a shot; none for other inputs.
     fn fps(&self) -> Option<Result<f64>> {
         if let Self::Folder(folder) = self { Some(folder.fps()) } else { None }
     }
 
-    /// The frames of a shot.
+    /// The frames of a shot; none for other inputs.
     fn frames(&self) -> Option<Vec<i32>> {
         if let Self::Folder(folder) = self { Some(folder.frames().to_vec()) } else { None }
     }
@@ -142,7 +142,7 @@ impl Source {
             Self::File(_) => Ok(()),
             Self::Sequence(pattern) => {
                 let path = pattern.path(whole_frame(frame, &pattern.path(0))?);
-                if path.is_file() { Ok(()) } else { Err(Error::file(path, "is not there")) }
+                if path.is_file() { Ok(()) } else { Err(Error::file(path, "does not exist")) }
             }
             Self::Folder(folder) => folder.refuse_missing(whole_frame(frame, folder.path())?),
         }
@@ -156,7 +156,7 @@ fn whole_frame(frame: Option<f64>, name: &Path) -> Result<i32> {
         Some(frame) => Err(Error::file(name, format!("has whole frames only, and --frame is {frame}"))),
         None => Err(Error::file(
             name,
-            "is of many frames: choose one with --frame N, or several with --frames A-B",
+            "holds many frames: choose one with --frame N, or several with --frames A-B",
         )),
     }
 }

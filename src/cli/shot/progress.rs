@@ -25,7 +25,7 @@ impl<'a> FrameProgress<'a> {
     pub fn new(ctx: &'a Context, total: usize, existing: usize, is_quiet: bool) -> Self {
         if existing > 0 && !is_quiet {
             // Progress is optional: a closed stderr does not stop the run.
-            let _ = writeln!(std::io::stderr(), "{existing} frames are there, {total} are to be made");
+            let _ = writeln!(std::io::stderr(), "{existing} frames exist, {total} are to be made");
         }
         let is_terminal = std::io::stderr().is_terminal();
         let done = Arc::new(AtomicUsize::new(0));

@@ -10,7 +10,7 @@ use crate::cli::session::{Failure, OrFailure, Session};
 /// Press moving objects into a layer of snow.
 ///
 /// Writes base/base.%04d.vdb (surface, compression, touched), removed/removed.%04d.vdb, grains/, mist/, fog/, snow/, mesh/ and objects/
-/// if the scene asks for it, report/base.%04d.json, shot.usda and scene.toml, the scene with every default filled in. Frames that are there
+/// if the scene asks for it, report/base.%04d.json, shot.usda and scene.toml, the scene with every default filled in. Frames that exist
 /// and match are not made again; a folder with frames of other settings is refused.
 #[derive(clap::Args)]
 #[command(after_help = "\

@@ -13,7 +13,7 @@ use crate::cli::session::{Failure, OrFailure, Session};
 ///
 /// Writes surface/surface.%04d.ply (with velocities over the coming frame, the distance that each vertex keeps, and flags where
 /// the liquid merged or split), report/surface.%04d.json, shot.usda and scene.toml, the scene with every default
-/// filled in. Frames that are there and match are not made again; a folder with frames of other settings is refused.
+/// filled in. Frames that exist and match are not made again; a folder with frames of other settings is refused.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -32,7 +32,7 @@ pub struct Args {
     /// Initial distance between particles (m) [default: estimated and logged]
     #[arg(long, value_name = "M", value_parser = positive, requires = "particles")]
     spacing: Option<f64>,
-    /// Frames a second, of the particles and of the shot [default: 24]
+    /// Frames per second, of the particles and of the shot [default: 24]
     #[arg(long, value_name = "N", value_parser = positive, requires = "particles")]
     fps: Option<f64>,
     #[command(flatten)]
@@ -82,6 +82,6 @@ fn existing_frames(particles: &Path) -> frazil::Result<Frames> {
     let frames = pattern.frames()?;
     match frames[..] {
         [first, .., last] | [first @ last] => Ok(Frames { first, last }),
-        [] => Err(frazil::Error::file(particles, "no frame of this sequence is there")),
+        [] => Err(frazil::Error::file(particles, "no frame of this sequence exists")),
     }
 }

@@ -92,8 +92,8 @@ pub fn offset(args: &OffsetArgs, session: &Session) -> Result<(), Failure> {
         source.scheme.unwrap_or(if is_beyond_band { SchemeName::Weno5 } else { SchemeName::FirstOrder });
     if is_beyond_band && scheme == SchemeName::FirstOrder {
         return Err(Failure::refused(format!(
-            "--scheme first-order would miss --by {} by a tenth of the way, for it leaves the band of distances ({} m): \
-             take weno5",
+            "--scheme first-order would miss --by {} by a tenth, since that leaves the band of distances ({} m): use \
+             weno5",
             args.by,
             grid.background()
         )));

@@ -51,7 +51,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     output::check_writable(&args.output).or_refuse()?;
     refuse_one_file(&args.output, &args.frame, "base.%04d.vdb")?;
     if args.stage == RebuildStage::Grains && args.packing.half {
-        return Err(Failure::refused("--half is of no use with --stage grains: points keep 32 bits"));
+        return Err(Failure::refused("--half cannot be used with --stage grains: points keep 32 bits"));
     }
     match args.stage {
         RebuildStage::Base => {
@@ -78,7 +78,7 @@ impl Args {
     /// Refuses frames that a cache lacks, and an output among its own files.
     fn check(&self, stored: &DoneFrames) -> Result<(), Failure> {
         if let Some(missing) = self.frame.iter().find(|frame| !stored.is_done(*frame)) {
-            return Err(Failure::of_file(&self.folder, format!("frame {missing} is not there")));
+            return Err(Failure::of_file(&self.folder, format!("frame {missing} does not exist")));
         }
         let folders = ["base", "removed", "grains", "state"].map(|name| self.folder.join(name));
         let own_folders: Vec<PathBuf> =

@@ -50,7 +50,7 @@ pub struct Args {
     /// Dilation of the sampled poses (cells; method samples)
     #[arg(long, value_name = "CELLS", default_value = "1")]
     dilate: f32,
-    /// Smoothing passes after that (method samples)
+    /// Smoothing passes after the dilation (method samples)
     #[arg(long, value_name = "N", default_value = "1")]
     smooth: u32,
     #[command(flatten)]
@@ -164,7 +164,7 @@ impl Args {
             ("--turn-deg", self.turn_deg.is_some()),
         ];
         match given.iter().find(|(name, given)| *given && refused.contains(name)) {
-            Some((name, _)) => Err(Failure::refused(format!("{name} is of no use with {with}"))),
+            Some((name, _)) => Err(Failure::refused(format!("{name} cannot be used with {with}"))),
             None => Ok(()),
         }
     }
@@ -175,7 +175,7 @@ fn morph(origin: &Origin, from: &Path, to: &Path) -> Result<Box<dyn Motion>, Fai
     let [first, second] = [from, to].map(|path| origin.read(path));
     let (first, second) = (first.or_refuse()?, second.or_refuse()?);
     if !first.has_faces_of(&second) {
-        return Err(Failure::of_file(to, format!("has other faces than {}", from.display())));
+        return Err(Failure::of_file(to, format!("has different faces from those of {}", from.display())));
     }
     Ok(Box::new(Morph::new(first.into_triangles(), second.positions).or_refuse()?))
 }

@@ -20,7 +20,7 @@ pub struct Args {
     /// Distance of the mesh from the surface (m); below 0 is inside
     #[arg(long, value_name = "M", default_value = "0", value_parser = finite, allow_hyphen_values = true)]
     iso: f64,
-    /// Larger triangles where the surface is flat, 0 to 1
+    /// How much to enlarge triangles where the surface is flat, 0 to 1
     #[arg(long, value_name = "PART", default_value = "0", value_parser = finite)]
     adaptivity: f64,
     /// File to write (.ply, .obj, .stl)

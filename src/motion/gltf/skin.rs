@@ -215,7 +215,7 @@ impl Vertices {
             None => (0..positions.len() as u32).collect(),
         };
         if indices.iter().any(|&index| index as usize >= numbers.len()) {
-            return Err("an index names a vertex that is not there".into());
+            return Err("an index names a vertex that does not exist".into());
         }
         let own = triangles(primitive.mode(), &indices);
         self.triangles.extend(own.iter().map(|triangle| triangle.map(|index| numbers[index as usize])));

@@ -126,8 +126,8 @@ enum BlockSamples {
 }
 
 impl Fog {
-    /// A fog of densities by block position (a multiple of 8 on each axis), each at most once. A density of 1 has this extinction (1/m,
-    /// above 0); density times extinction is clamped to a million.
+    /// A fog of densities by block position (in voxels, a multiple of 8 on each axis, each position at most once). A density of 1 has
+    /// the extinction `extinction` (1/m, above 0); density times extinction is clamped to a million.
     ///
     /// # Errors
     /// Densities too far apart, or too many for the memory limit; cancel.
@@ -222,7 +222,7 @@ impl Fog {
         (inside.then_some(slot), (x * NODE as usize + y) * NODE as usize + z)
     }
 
-    /// Contents of a block position, in blocks.
+    /// Contents of a block position (counted in blocks).
     pub(super) fn lookup(&self, position: [i32; 3]) -> Lookup {
         let (Some(slot), within) = self.slot(position) else { return Lookup::Outside };
         match self.table[slot] {

@@ -318,7 +318,7 @@ fn check_from(
     }
     let before = from - 1;
     if stage.has_memory() && !stored.is_done(before) {
-        return refused(format!("--from {from} needs frame {before}, which is not there"));
+        return refused(format!("--from {from} needs frame {before}, which does not exist"));
     }
     if stage.has_memory() && stored.latest_state(before..=before).is_none() {
         let kept: Vec<String> = stored
@@ -336,7 +336,7 @@ fn check_from(
     }
     match frames.iter().find(|frame| *frame < from && !stored.is_done(*frame)) {
         Some(gap) => refused(format!(
-            "frame {gap} is not there, and --from {from} keeps the frames before {from} as they are: ask for --frames from \
+            "frame {gap} does not exist, and --from {from} keeps the frames before {from} as they are: ask for --frames from \
              {from} on"
         )),
         None => Ok(()),

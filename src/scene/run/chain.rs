@@ -117,7 +117,7 @@ pub(super) fn missing(stage: &dyn Stage, frame: i32, upstream: &str, folder: &Pa
         return Error::file(folder.join(&file.path), what);
     }
     let what = format!(
-        "frame {frame} of stage {name} needs that of stage {upstream}, which is not there: make it too"
+        "frame {frame} of stage {name} needs that of stage {upstream}, which does not exist: make it too"
     );
     Error::file(folder, what)
 }

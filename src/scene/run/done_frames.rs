@@ -151,7 +151,7 @@ impl DoneFrames {
     /// # Errors
     /// A missing frame; a file that differs from what was written.
     pub fn state_file(&self, frame: i32) -> Result<PathBuf> {
-        let missing = || Error::file(&self.folder, format!("frame {frame} is not there"));
+        let missing = || Error::file(&self.folder, format!("frame {frame} does not exist"));
         let manifest = self.done.get(&frame).ok_or_else(missing)?;
         let written: Option<&Written> = match manifest.keeps {
             Keeps::State => manifest.state.as_ref(),

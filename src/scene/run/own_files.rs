@@ -98,14 +98,14 @@ impl OwnFiles {
     pub fn refuse_foreign(&self, pipeline: &Pipeline, frames: &FrameChoice) -> Result<()> {
         for input in pipeline.scene.files() {
             if input.parent().is_some_and(|folder| self.writes_to(folder, &input)) {
-                let what = "is an input of the scene and would be written over: choose another -o";
+                let what = "is an input of the scene and would be overwritten: choose another -o";
                 return Err(Error::file(input, what));
             }
         }
         let scene = pipeline.scene;
         let new = hash::of_bytes(scene.to_toml_in(&self.folder).as_bytes());
         if is_same(&scene.path, &self.folder.join(SCENE)) && hash::of_file(&scene.path)? != new {
-            let what = "is the scene that is read and would be written over: choose another -o";
+            let what = "is the scene that is read and would be overwritten: choose another -o";
             return Err(Error::file(&scene.path, what));
         }
         if scene.output.usd {

@@ -112,13 +112,13 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
     for _ in 0..from.count(20)? {
         let grains = [from.u32()?, from.u32()?];
         if grains.iter().any(|grain| *grain as usize >= count) || grains[0] == grains[1] {
-            return Err(wrong("has a contact of a grain that is not there"));
+            return Err(wrong("has a contact of a grain that does not exist"));
         }
         heap.pair_impulses.push(PairImpulse { grains, impulse: from.f32s()? });
     }
     for _ in 0..from.count(24)? {
         let (grain, collider) = (from.u32()?, from.u32()?);
-        require((grain as usize) < count, "has a contact of a grain that is not there")?;
+        require((grain as usize) < count, "has a contact of a grain that does not exist")?;
         let ([impulse], tangential) = (from.f32s()?, from.f32s()?);
         heap.touches.push(Touch { grain, collider, impulse, tangential, ..Touch::default() });
     }

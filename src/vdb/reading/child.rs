@@ -27,7 +27,7 @@ pub(in crate::vdb) enum Wanted<'a> {
     Floats(Option<&'a str>),
     /// The grid of floats with this index.
     Nth(usize),
-    /// The same as `Floats`, of floats or vectors.
+    /// As `Floats`, but the grid may be of floats or vectors.
     Any(Option<&'a str>),
     Points(Option<&'a str>),
 }

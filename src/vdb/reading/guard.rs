@@ -29,8 +29,8 @@ use crate::vdb::grid_info::GridInfo;
 use crate::vdb::point_arrays;
 use crate::vdb::vectors::AnyGrid;
 
-/// Memory limit of a child: for any file (bytes), and for each byte of the file. The maximum per byte is that of a node above the leaves,
-/// 260 kB for at least 8 kB, or of a leaf, 2.2 kB for at least 129 bytes.
+/// Memory limit of a child: for any file (bytes), and for each byte of the file. Nodes above the leaves need the most memory per byte
+/// (260 kB for at least 8 kB), then leaves (2.2 kB for at least 129 bytes).
 const FIXED_MEMORY: u64 = 384 << 20;
 const MEMORY_PER_BYTE: u64 = 64;
 /// CPU time (s) of a child: for any file, and for each MB.

@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::fs;
 use std::path::Path;
 
-/// A hero of 1 s a round who walks at 1.1 m/s, over 49 frames of 24 a second, in snow of 0.15 m.
+/// A hero of 1 s a round who walks at 1.1 m/s, over 49 frames at 24 frames per second, in snow of 0.15 m.
 fn folder(keys: &str) -> Folder {
     let folder = Folder::empty();
     fs::write(folder.join("hero.glb"), hero::glb()).unwrap();
@@ -83,7 +83,7 @@ fn info_prints_how_a_clip_is_to_be_carried_and_many_nodes_as_a_tree() {
     let gait = &info[0]["holds"][0]["gaits"]["walk"];
     assert!((gait["stride"].as_f64().unwrap() - 1.1).abs() < 0.03 && gait["steady"] == true, "{gait}");
     let words = works(&folder, "info hero.glb");
-    assert!(words.contains("\"walk\": carry it by [") && words.contains("or its feet slip"), "{words}");
+    assert!(words.contains("\"walk\": move it by [") && words.contains("or its feet slip"), "{words}");
     // Eight boxes that hang on two empty nodes.
     let node = |n: usize| format!("{{\"name\":\"box{n}\",\"mesh\":0}}");
     let boxes: Vec<String> = (0..8).map(node).collect();

@@ -170,7 +170,7 @@ fn mist_is_drawn_over_the_snow_of_its_frame() {
     bytes[last] ^= 1;
     fs::write(path, bytes).unwrap();
     fails(folder, &format!("preview shot --frame 2 -o p.png {SIZE}"), 2, &["mist.0002.vdb"]);
-    // Only a flipbook needs to know how many frames a second there are.
+    // Only a flipbook needs to know the frame rate.
     fs::remove_file(folder.join("shot/scene.toml")).unwrap();
     works(folder, &format!("preview shot --frame 1 -o p.png {SIZE}"));
     fails(folder, &format!("preview shot --frames 1 -o p.gif {SIZE}"), 2, &["scene.toml", "--fps"]);
@@ -198,7 +198,7 @@ fn what_cannot_be_drawn_is_said_before_anything_is_written() {
         ("shot/base/base.0001.vdb --fps 12 -o p.png", &["--fps", "none is given"]),
         ("bare -o p.gif", &["bare", "no folder of a shot"]),
         ("shot/base/base.%04d.vdb -o p.png", &["base.0000.vdb", "--frame"]),
-        ("shot/base/base.%04d.vdb --frames 5-6 -o p.gif", &["base.0005.vdb", "not there"]),
+        ("shot/base/base.%04d.vdb --frames 5-6 -o p.gif", &["base.0005.vdb", "does not exist"]),
         ("shot --frames 1-4 -o none/p.%04d.png", &["none"]),
         ("grains.ply cube.obj --clip walk -o p.png", &["--clip"]),
         ("shot --frame 2 --fps 12 -o p.png", &["--fps", ".gif"]),

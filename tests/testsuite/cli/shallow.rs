@@ -330,7 +330,7 @@ fn a_picture_shows_the_ground_through_thin_liquid() {
     let deep = middle("thick", "--color depth");
     assert!(deep != thick, "{deep:?}");
     fails(folder, "preview thick -o no.png --color heat", 2, &["--color heat"]);
-    fails(folder, "preview thick --frame 9 -o no.png", 2, &["frame 9 is not there", "1 to 3, of liquid"]);
+    fails(folder, "preview thick --frame 9 -o no.png", 2, &["frame 9 does not exist", "1 to 3, of liquid"]);
     works(folder, "preview thick --frames 1-3 -o thick.gif --size 32x24");
     works(folder, "preview thick --cut z=0 -o cut.png --size 32x24");
     // Without its terrain the liquid is drawn alone, and a warning says so.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::program::{CUBE, Folder, works};
 
-/// What `check` says of a cube with these keys, frames 1 to 3 at 24 a second: the speed (m/s) and the frame of it, and all.
+/// What `check` says of a cube with these keys, frames 1 to 3 at 24 frames per second: the speed (m/s) and the frame of it, and all.
 fn check_of(folder: &Path, keys: &str) -> (f64, i64, String) {
     let scene = format!(
         "[shot]\nframes = \"1-3\"\n[snow]\nground = 0.0\narea = [-1, -1, 1, 1]\ndepth = 0.3\ncell = 0.05\n\

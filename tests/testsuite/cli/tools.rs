@@ -32,7 +32,10 @@ fn a_new_scene_lacks_nothing_but_its_character() {
     fs::write(folder.join("new.toml"), works(&folder, "new snow")).unwrap();
     fails(&folder, "check new.toml", &["hero.glb", "no such file"]);
     let said = works(&folder, "check new.toml --set object.1.file=box.obj");
-    assert!(said.contains("120, 5.00 s at 24 a second") && said.contains("800 x 800 columns"), "{said}");
+    assert!(
+        said.contains("120, 5.00 s at 24 frames per second") && said.contains("800 x 800 columns"),
+        "{said}"
+    );
     // Every line behind a # is a default: with all of them in force nothing changes.
     let text = fs::read_to_string(folder.join("new.toml")).unwrap();
     // But for those of tables without which their stages are left out.

@@ -1,4 +1,4 @@
-//! Damaged and outside particle caches: one sentence for each that is refused, no panic, no memory for what is not there.
+//! Damaged and outside particle caches: one sentence for each that is refused, no panic, no memory for data that a file does not hold.
 
 use crate::common::skip::skipped;
 use std::time::{Duration, Instant};

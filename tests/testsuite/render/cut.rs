@@ -175,7 +175,7 @@ fn what_cannot_be_cut_is_refused() {
     let folder = &with_ball();
     fs::write(folder.join("drop.xyz"), "0 0 0\n1 1 1\n").unwrap();
     for (arguments, words) in [
-        ("ball.vdb --cut y=2", &["--cut y=2 is beside what is drawn", "-0.5"][..]),
+        ("ball.vdb --cut y=2", &["--cut y=2 misses what is drawn", "-0.5"][..]),
         ("ball.vdb --cut w=1", &["x=0.1"]),
         ("ball.vdb --cut y", &["x=0.1"]),
         ("ball.vdb --cut y=nan", &["x=0.1"]),

@@ -128,7 +128,7 @@ pub fn resume_in_every_way(folder: &Path) {
     assert!(plain.env("FRAZIL_CPU", "baseline").status().unwrap().success());
     are_same(folder, "whole", "baseline");
     let said = works(folder, &format!("{shot} -o whole"));
-    assert!(said.contains("40 frames are there, 0 are to be made"), "{said}");
+    assert!(said.contains("40 frames exist, 0 are to be made"), "{said}");
     let checked = works(folder, "check whole");
     assert!(checked.contains("40 frames") && checked.contains("all of them"), "{checked}");
 }
@@ -168,7 +168,7 @@ fn a_run_goes_on_with_other_settings_but_not_on_another_terrain() {
     write_shot(folder, "", LIQUID);
     works(folder, "shallow spill.toml -o long");
     let said = works(folder, "shallow spill.toml -o long --set shot.frames=1-10");
-    assert!(said.contains("8 frames are there, 2 are to be made"), "{said}");
+    assert!(said.contains("8 frames exist, 2 are to be made"), "{said}");
     // A state that was damaged is named, and one that is gone is made again.
     let state = folder.join("long/state/liquid.0010.liquid");
     let mut bytes = fs::read(&state).unwrap();

@@ -74,7 +74,7 @@ fn check_reads_all_that_a_folder_holds_and_names_what_is_damaged() {
         let folder = folder(3, written);
         works(&folder, "snow shot.toml -o out -q");
         let said = works(&folder, "check out");
-        assert!(said.contains("3 frames") && said.contains("what was written"), "{said}");
+        assert!(said.contains("3 frames") && said.contains("as they were written"), "{said}");
         let out = folder.join("out");
         let names = files(&out);
         assert!(names.len() >= 14, "{names:?}");
@@ -131,7 +131,7 @@ fn from_is_refused_whole_when_the_asked_frames_cannot_be_made() {
     assert!(before == output(&folder.join("out")));
     works(&folder, "snow shot.toml -o gaps -q --frames 1,2,5-8");
     let before = output(&folder.join("gaps"));
-    fails(&folder, "snow shot.toml -o gaps --from 6", 2, &["frame 3 is not there", "--frames from 6"]);
+    fails(&folder, "snow shot.toml -o gaps --from 6", 2, &["frame 3 does not exist", "--frames from 6"]);
     assert!(before == output(&folder.join("gaps")));
     // A damaged frame before it: nothing is removed.
     flip(&folder.join("out/base/base.0005.vdb"), 0.5);

@@ -195,7 +195,7 @@ fn damaged_changes_are_one_error_that_names_the_file() {
     // One that is gone, one of another scene, and one of the same length.
     let rebuild = |frame: i32| format!("vdb rebuild out --stage grains --frame {frame} -o x.vdb");
     fs::remove_file(&path).unwrap();
-    fails(at, &rebuild(8), 2, &["out", "frame 8 is not there"]);
+    fails(at, &rebuild(8), 2, &["out", "frame 8 does not exist"]);
     fails(at, &rebuild(9), 1, &["out", "frame 8 has no file in grains/"]);
     works(at, &rebuild(7));
     works(at, &rebuild(7).replace("x.vdb", "seven.vdb"));
@@ -392,7 +392,7 @@ fn shot_usda_has_the_grains_that_have_usd_files() {
         names.iter().for_each(|name| assert!(manifest.contains(name), "no {name} in {manifest}"));
         assert_eq!(text.matches("\"constant\"").count(), 1, "frame {frame}");
     }
-    assert!(works(at, "check out").contains("all of them are what was written"));
+    assert!(works(at, "check out").contains("all of them are as they were written"));
     // Volumes hold no points.
     works(at, "snow shot.toml -o plain -q --set output.grains=[\"vdb\"]");
     assert!(!fs::read_to_string(at.join("plain/shot.usda")).unwrap().contains("grains"));

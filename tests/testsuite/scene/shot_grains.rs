@@ -137,7 +137,7 @@ fn a_check_says_how_many_grains_the_base_gives() {
     };
     let before = report("-o cache");
     assert_eq!(before["grains"], serde_json::Value::Null);
-    assert!(works(at, "check shot.toml").contains("when the base is there"));
+    assert!(works(at, "check shot.toml").contains("when the base exists"));
     works(at, "snow shot.toml -o cache -q --stage base --frames 1-4");
     assert_eq!(report("-o cache")["grains"]["to_frame"], 4);
     assert!(works(at, "check shot.toml -o cache").contains("up to frame 4 of 10"));

@@ -66,7 +66,7 @@ fn mist_is_made_and_made_again_without_touching_base_and_grains() {
     for words in ["def Volume \"mist\"", "rel field:density = </shot/mist/density>", "./mist/mist.0010.vdb"] {
         assert!(stage.contains(words), "no {words:?} in {stage}");
     }
-    assert!(works(at, "check out").contains("all of them are what was written"));
+    assert!(works(at, "check out").contains("all of them are as they were written"));
 
     let (before, first) = (written(at, "out", &["base", "removed", "grains"]), grids(at, "out"));
     let set = "--set mist.half_life=0.2";

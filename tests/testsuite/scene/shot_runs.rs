@@ -77,12 +77,12 @@ fn a_second_run_makes_nothing_again() {
     let stamp = |name: &str| fs::metadata(folder.join(name)).unwrap().modified().unwrap();
     let before = stamp("out/base/base.0002.vdb");
     let said = works(&folder, "snow shot.toml -o out");
-    assert!(said.contains("4 frames are there, 0 are to be made"), "{said}");
+    assert!(said.contains("4 frames exist, 0 are to be made"), "{said}");
     assert_eq!(before, stamp("out/base/base.0002.vdb"));
     // A frame that is gone is made again, and only that one.
     fs::remove_file(folder.join("out/removed/removed.0003.vdb")).unwrap();
     let said = works(&folder, "snow shot.toml -o out");
-    assert!(said.contains("3 frames are there, 1 are to be made"), "{said}");
+    assert!(said.contains("3 frames exist, 1 are to be made"), "{said}");
     assert_eq!(before, stamp("out/base/base.0002.vdb"));
 }
 
@@ -140,7 +140,7 @@ fn other_settings_are_refused_by_name_and_from_keeps_what_is_before() {
     let deeper = format!("snow shot.toml -o out {set} --set snow.depth=0.2 --from 3");
     fails(&folder, &deeper, 2, &["--from 3", "another layer", "snow.depth was 0.3"]);
     assert_eq!(differences(&after, &output(&folder.join("out"))), Vec::<String>::new());
-    fails(&folder, "snow shot.toml -o new --from 4", 2, &["frame 3", "not there"]);
+    fails(&folder, "snow shot.toml -o new --from 4", 2, &["frame 3", "does not exist"]);
     assert!(!folder.join("new").exists());
     fails(&folder, "snow shot.toml -o new --from 9", 2, &["--from 9", "1-6"]);
 }
@@ -208,7 +208,7 @@ fn damaged_records_and_files_are_named() {
     }
     fs::remove_file(path("state/base.0003.json")).unwrap();
     let said = works(&folder, "snow shot.toml -o out");
-    assert!(said.contains("3 frames are there, 1 are to be made"), "{said}");
+    assert!(said.contains("3 frames exist, 1 are to be made"), "{said}");
     // The length is right, the content is not: no run resumes from it.
     let mut bytes = fs::read(path("base/base.0003.vdb")).unwrap();
     let middle = bytes.len() / 2;
@@ -273,7 +273,7 @@ fn whole_frames_are_rebuilt_from_changes() {
     }
     let [five, rebuilt] = ["five.vdb", "rebuilt.0005.vdb"].map(|name| fs::read(folder.join(name)).unwrap());
     assert!(five == rebuilt);
-    fails(&folder, "vdb rebuild delta --frame 9 -o nine.vdb", 2, &["frame 9", "not there"]);
+    fails(&folder, "vdb rebuild delta --frame 9 -o nine.vdb", 2, &["frame 9", "does not exist"]);
     fails(&folder, "vdb rebuild delta --frame 1-2 -o two.vdb", 2, &["pattern"]);
     fails(&folder, "vdb rebuild nowhere --frame 1 -o one.vdb", 2, &["nowhere"]);
 }

@@ -40,7 +40,7 @@ fn volumes_are_made_and_made_again_without_touching_base_and_grains() {
     assert_eq!(of_file("snow/snow.0010.vdb"), [("surface".to_string(), 0.02 / 5.0)]);
     let mesh = frazil::io::mesh::read(&at.join("out/mesh/mesh.0010.ply")).unwrap();
     assert!(mesh.is_closed() && mesh.triangles.len() > 1000);
-    assert!(works(at, "check out").contains("all of them are what was written"));
+    assert!(works(at, "check out").contains("all of them are as they were written"));
     // Of the grains only the states that a run resumes from are kept.
     let states = fs::read_dir(at.join("out/state")).unwrap().map(|entry| entry.unwrap().file_name());
     assert_eq!(states.filter(|name| name.to_string_lossy().ends_with(".grains")).count(), 2);

@@ -219,7 +219,7 @@ fn skirts_end_at_the_silhouette_of_the_ground() {
     }
     // Bad meshes.
     let error = silhouette.fit(&mut ledges, &columns, &positions, &[[0, 1, 99]]).unwrap_err().to_string();
-    assert!(error.contains("not there"), "{error}");
+    assert!(error.contains("does not exist"), "{error}");
     positions[3].y = f32::NAN;
     let error = silhouette.fit(&mut ledges, &columns, &positions, &faces).unwrap_err().to_string();
     assert!(error.contains("not finite"), "{error}");

@@ -1,4 +1,4 @@
-//! Gate of mist over time: the same from 24, 48 and 96 frames a second.
+//! Gate of mist over time: the same at 24, 48 and 96 frames per second.
 
 use frazil::Context;
 use frazil::flow::Tiles;
@@ -172,7 +172,7 @@ fn in_blocks(mist: &Mist) -> std::collections::BTreeMap<[i32; 3], [f64; 4]> {
     out
 }
 
-/// How far mist of fewer frames a second is from that of 96.
+/// How far mist at a lower frame rate is from that at 96 frames per second.
 pub fn measure() -> (f64, String) {
     let ctx = context(2);
     let (mut worst, mut note) = (0.0f64, String::new());

@@ -45,8 +45,8 @@ pub struct Args {
     /// Initial distance between particles (m) [default: estimated and logged]
     #[arg(long, value_name = "M", value_parser = positive)]
     spacing: Option<f64>,
-    /// Edge of a voxel (m), 1/8 to 2 spacings; of spheres 1/100 to 2/3 of their radius [default: half a spacing; of spheres at most
-    /// a third of their radius]
+    /// Edge of a voxel (m), 1/8 to 2 spacings; for spheres 1/100 to 2/3 of their radius [default: half a spacing; for spheres at
+    /// most a third of their radius]
     #[arg(long, value_name = "M", value_parser = positive)]
     cell: Option<f64>,
     /// Method that makes a surface of particles
@@ -61,10 +61,10 @@ pub struct Args {
     /// Level set to cut out of the liquid (.vdb), or a sequence of them (collider.%04d.vdb); can be given several times
     #[arg(long, value_name = "FILE")]
     subtract: Vec<PathBuf>,
-    /// Attributes of the particles to transfer to the mesh (.ply), as means over those around each vertex: v, density, or all
+    /// Attributes of the particles to transfer to the mesh (.ply), as means over the particles around each vertex: v, density, or all
     #[arg(long, value_name = "A,B", value_delimiter = ',', requires = "mesh")]
     attributes: Vec<String>,
-    /// Leave out groups of fewer particles than this that are apart from all others
+    /// Leave out isolated groups of fewer than N particles
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     min_drop: Option<u32>,
     /// Only particles in a box: its minimum corner (m)
@@ -91,14 +91,14 @@ pub struct Args {
     packing: Packing,
 }
 
-/// Minimum cells in the radius of a sphere, unless `--cell` is given: with half of them a drop alone loses a third of its volume.
+/// Minimum cells in the radius of a sphere, unless `--cell` is given: with half as many, a lone drop loses a third of its volume.
 const SPHERE_CELLS: f64 = 3.0;
 
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
     session.ctx.set_memory_limit(session.max_memory());
     if args.radius.is_some() && args.method != Method::Spheres {
-        return Err(Failure::refused("--radius is of no use without --method spheres"));
+        return Err(Failure::refused("--radius needs --method spheres"));
     }
     let input = Pattern::parse(&args.particles);
     let frames = args.frames(input.is_some())?;
@@ -168,7 +168,7 @@ impl Args {
         match (&self.frames, sequence) {
             (None, Some(path)) => Err(needs_frames(path)),
             (Some(frames), _) if !is_sequence && frames.count() > 1 => {
-                Err(Failure::refused("several --frames are of no use with one file of particles"))
+                Err(Failure::refused("several --frames cannot be used with a single file of particles"))
             }
             (Some(frames), _) => Ok(frames.clone()),
             (None, None) => Ok(one_frame()),

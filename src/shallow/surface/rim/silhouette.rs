@@ -45,7 +45,7 @@ impl Silhouette {
             return Err(Error::argument("a vertex of the ground is not finite"));
         }
         if faces.iter().flatten().any(|&vertex| vertex as usize >= positions.len()) {
-            return Err(Error::argument("a face of the ground has a vertex that is not there"));
+            return Err(Error::argument("a face of the ground has a vertex that does not exist"));
         }
         ledges.find(columns);
         ledges.skirt_vertices.extend_from_slice(self.find(columns, positions, faces)?);
