@@ -32,7 +32,7 @@ pub fn floor(value: f64) -> i32 {
 }
 
 impl Lattice {
-    /// A lattice whose origin is the block nearest to a world position (m).
+    /// A lattice whose origin voxel is the first of the block that contains a world position (m).
     ///
     /// # Errors
     /// When the position is so far from the world's origin that voxel indices overflow.
@@ -73,7 +73,7 @@ impl Lattice {
         let scaled = cells * f64::from(UNITS);
         if !(scaled.x.abs() < LIMIT && scaled.y.abs() < LIMIT && scaled.z.abs() < LIMIT) {
             let far = cells.amax() * self.voxel;
-            return Err(Error::argument(too_far("a vertex lies", far, "the work", self.voxel)));
+            return Err(Error::argument(too_far("a vertex lies", far, "the local origin", self.voxel)));
         }
         Ok([scaled.x.round() as i32, scaled.y.round() as i32, scaled.z.round() as i32])
     }

@@ -1,4 +1,4 @@
-//! Nearest triangle of every voxel of a block, by subdivision: bounds at the centres of 4^3 and 2^3 sub-blocks leave few triangles for the
+//! Nearest triangle to every voxel of a block, by subdivision: bounds at the centres of 4^3 and 2^3 sub-blocks leave few triangles for the
 //! exact distances.
 
 use super::triangle::{Offsets, Points, Triangle, near_lanes, nearest, prune, to_each};
@@ -15,24 +15,24 @@ pub struct Search {
     centre: Vec<[f32; 4]>,
 }
 
-/// Half diagonals between the voxel centres of a 4^3 and of a 2^3 sub-block (cells), rounded up.
+/// Half the distance between opposite corner voxels of a 4^3 and of a 2^3 sub-block (cells), rounded up.
 const RADII: [f32; 2] = [2.599, 0.867];
 
 /// Eight voxels, 2^3, and the triangles nearest to them.
 pub struct Group<'a> {
-    /// Index of the first one in its block.
+    /// Index of the first voxel in its block.
     first: usize,
-    /// Positions from the block's corner (cells).
+    /// Positions of the voxels from the block's corner (cells).
     pub points: Points,
-    /// Squared distances (cells^2).
+    /// Squared distance of each voxel from its nearest triangle (cells^2).
     pub squared: [f32; LANES],
-    /// Index of the nearest triangle of each.
+    /// Index of the triangle nearest to each voxel.
     pub nearest: [u32; LANES],
     /// All triangles within `complete` of one of the voxels, and some that are farther away.
     pub near: &'a [u32],
     /// Distance (cells) up to which `near` is complete.
     pub complete: f32,
-    /// Offsets of the eight 4^3 sub-blocks' centres from all triangles, and which of them contains the voxels.
+    /// Offsets of the eight 4^3 sub-blocks' centres from all triangles, and the index of the sub-block of the voxels.
     far: (&'a [Offsets], usize),
 }
 

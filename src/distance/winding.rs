@@ -127,7 +127,7 @@ impl Axis {
         (towards > 0) == (along > 0)
     }
 
-    /// The voxel at coordinates (p, q) of a line, and at `along` on its own axis.
+    /// The voxel at position `along` on the line with coordinates (p, q).
     pub fn voxel(self, [p, q]: [i32; 2], along: i32) -> [i32; 3] {
         match self {
             Self::X => [along, q, p],
@@ -192,7 +192,7 @@ pub fn each_crossing(
     let unit = i64::from(UNITS);
     let (low, high) = range(flat.map(|p| p[1]));
     let [[p0, p1], [q0, q1]] = bounds;
-    // A line leaves the chain through a face whose normal points along it (area > 0).
+    // A line leaves the volume through a face whose normal points along it (area > 0).
     let mut change = if area > 0 { -face.coef } else { face.coef };
     let mirror = if axis == Axis::Y { -1.0 } else { 1.0 };
     if axis == Axis::Y {

@@ -1,6 +1,6 @@
-//! The air around the tiles: a flow with cells twice as wide, which covers the same region and a margin around it, with another one around
-//! it, and so on. It provides the pressure and the velocity at the border of the tiles, as if the air continued: one tile of padding is
-//! enough.
+//! The air around the tiles: a flow with cells twice as wide, which covers the same region and a margin around it, with another such flow
+//! around it, and so on. It provides the pressure and the velocity at the border of the tiles, as if the air continued: one tile of padding
+//! is enough.
 //!
 //! Where both exist, the fine velocity takes precedence: its mean is written into the coarse cells before their projection.
 
@@ -16,7 +16,7 @@ use crate::numeric::cpu::dispatch;
 pub const RATIO: i32 = 2;
 /// Number of surrounding flows, one around the other.
 pub const LEVELS: u32 = 3;
-/// Tiles of coarse cells around those that hold fine ones.
+/// Width (coarse tiles) of the border around the coarse tiles that cover fine ones.
 const PADDING: i32 = 1;
 
 /// Sorted coordinates of the coarse tiles around fine ones.
@@ -27,9 +27,9 @@ pub fn tiles_around(fine: &[Coord]) -> Vec<Coord> {
     padded(&coarse, PADDING)
 }
 
-/// Wide cells along the edge of a fine tile.
+/// Coarse cells along the edge of a fine tile.
 const COARSE_EDGE: usize = 8 / RATIO as usize;
-/// Wide cells in a fine tile.
+/// Coarse cells in a fine tile.
 const COARSE_CELLS: usize = COARSE_EDGE * COARSE_EDGE * COARSE_EDGE;
 
 /// Writes the mean fine velocity into the coarse faces that fine faces of active cells cover.
@@ -93,11 +93,11 @@ pub struct Reader<'a> {
     pub outside: f32,
 }
 
-/// Wide cells on an axis that the interpolation of a fine tile reads: those that the tile covers and one on each side.
+/// Coarse cells on an axis that the interpolation of a fine tile reads: those that the tile covers and one on each side.
 const READ: usize = COARSE_EDGE + 2;
 
-/// For each of eight fine positions on an axis: the first of the two coarse cells that are read, as an index into [`READ`], and the weight
-/// of the second.
+/// For each of eight fine positions on an axis: the first of the two coarse cells that are read, as an index among the [`READ`] cells,
+/// and the weight of the second.
 type Weights = [(usize, f32); 8];
 
 /// Weights of linear interpolation; `is_centre`: values are at the centres on this axis.

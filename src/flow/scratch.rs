@@ -15,7 +15,7 @@ pub struct Scratch {
 }
 
 impl Scratch {
-    /// Three fields each for the paths back and ahead of active tiles, and three fields that include the rim.
+    /// For active tiles, three fields each for the paths back and ahead; then three fields that include the rim.
     #[allow(clippy::type_complexity)]
     pub fn paths(&mut self, tiles: &Tiles) -> ([&mut [Tile]; 3], [&mut [Tile]; 3], [&mut [Tile]; 3]) {
         let Self { with_rim, fields } = self;

@@ -7,7 +7,7 @@ use super::tiles::{NONE, Tile, Tiles};
 pub struct Faces {
     /// Open fraction (0..=1) of the lower faces of each cell, on each axis.
     pub open: [Tile; 3],
-    /// Speed (m/s) along the axis of the solid that covers the rest of the face.
+    /// Speed (m/s), along the axis, of the solid that covers the rest of the face.
     pub speed: [Tile; 3],
 }
 

@@ -167,7 +167,7 @@ pub fn padded(tiles: &[Coord], padding: i32) -> Vec<Coord> {
     out
 }
 
-/// Sorted coordinates of the tiles within this many steps, each across a face or an edge.
+/// Sorted coordinates of the tiles within `steps` steps of any of these, each step across a face or an edge.
 pub fn bordered(tiles: &[Coord], steps: usize) -> Vec<Coord> {
     let mut out = tiles.to_vec();
     for _ in 0..steps {

@@ -9,7 +9,7 @@ use super::window::{Span, Window};
 use crate::context::Context;
 use crate::error::Result;
 
-/// Margin (cells) around a tile in which velocities at centres, and vorticities, are computed.
+/// Margins (cells) around a tile in which velocities at centres, and vorticities, are computed.
 const CENTRES: usize = 3;
 const CURLS: usize = 2;
 /// Minimum difference of the vorticity, times a cell (m/s), across two cells: below it the direction to the maximum is undefined.
@@ -38,7 +38,7 @@ impl Cube {
 }
 
 impl Flow {
-    /// Confines vorticity: `gain` is its strength (1/s) times the time (s).
+    /// Confines vorticity: `gain` is the strength (1/s) times the length of the step (s).
     ///
     /// # Errors
     /// Cancel.

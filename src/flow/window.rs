@@ -7,7 +7,7 @@ use crate::numeric::lanes::Lanes;
 pub const MAX_MARGIN: i32 = 7;
 /// Layers, and rows of a layer: 8 + 2 x 7.
 const SIDE: usize = 22;
-/// Values of a row: whole rows of the tile and of the tiles before and behind it, which is the fastest to copy.
+/// Values of a row: the whole rows of three tiles (the tile, and those before and behind it), which are the fastest to copy.
 const ROW: usize = 24;
 /// Values of a layer.
 const LAYER: usize = SIDE * ROW;
@@ -96,7 +96,7 @@ impl Window {
         }
     }
 
-    /// The value of a cell, relative to the tile's first cell; each coordinate is at least -7.
+    /// The value of a cell given relative to the tile's first cell; each coordinate is at least -7.
     #[inline(always)]
     pub fn at(&self, x: i32, y: i32, z: i32) -> f32 {
         let index = (x + MAX_MARGIN) as usize * LAYER + (y + MAX_MARGIN) as usize * ROW + (z + 8) as usize;

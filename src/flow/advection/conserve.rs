@@ -4,8 +4,8 @@
 //! Every corner of the tiles has a hat function: a weight of 1 there that falls linearly to 0 at the adjacent corners, so that all hats
 //! sum to 1 at each point. Each cell carries its mass along its path to a point, and thus into the eight hats around it: this is
 //! the mass that each hat should hold. After advection the hat holds a different mass. The density is then multiplied by factors that are
-//! given at the corners and linear in between, the mass that each hat should hold over the mass that it holds, so that the total mass is
-//! right to rounding and no density farther than a tile from a loss changes, unless a hat would have to grow by more than `MAX_GAIN`.
+//! given at the corners (the mass that the hat should hold divided by the mass that it holds) and linear in between, so that the total mass
+//! is right to rounding and no density farther than a tile from a loss changes, unless a hat would have to grow by more than `MAX_GAIN`.
 
 use rayon::prelude::*;
 
@@ -25,8 +25,8 @@ const MAX_GAIN: f64 = 1.2;
 /// Passes in which a hat that would have to grow by more than [`MAX_GAIN`] hands the excess to the adjacent hats. The excess that remains
 /// after them is spread over all of the density.
 const PASSES: usize = 6;
-/// In a step a density below `fade_below` loses this share of its difference from it. It fades slowly on purpose: when it was removed at
-/// once, flows that differed only by rounding soon differed by as much as `fade_below`.
+/// In a step a density below `fade_below` loses this share of its difference from `fade_below`. It fades slowly on purpose: when it was
+/// removed at once, flows that differed only by rounding soon differed by as much as `fade_below`.
 const FADING: f32 = 0.125;
 /// Rounds of factors. Factors that are linear between corners correct a hat only in part where the adjacent hats need the opposite; the
 /// last round makes the sum of all hats right.
@@ -35,11 +35,11 @@ const ROUNDS: usize = 2;
 const ROUNDING: [f64; 2] = [2.0e-6, 1.0e-7];
 /// Hats on an axis that a tile's mass may go to: those of the corners 8 cells before its first corner, at it, and 8 and 16 cells behind it.
 const HATS: usize = 4;
-/// Masses in the hats around a tile (cells).
+/// Masses in the hats around a tile (in cells of density 1).
 pub type Masses = [f32; HATS * HATS * HATS];
 
-/// The mass (cells) that each corner's hat should hold after advection; corners are indexed by the slot of the tile whose first cell they
-/// bound.
+/// The mass (in cells of density 1) that each corner's hat should hold after advection; corners are indexed by the slot of the tile whose
+/// first cell they bound.
 ///
 /// # Errors
 /// Cancel.
@@ -153,7 +153,7 @@ fn hat_masses(tiles: &Tiles, masses: &[Masses]) -> Vec<f64> {
     let of_corner = |corner: usize| {
         let mut sum = 0.0;
         for hat in 0..HATS * HATS * HATS {
-            // Offset of the tile whose hat this is; a tile two away is reached over one that is adjacent to both.
+            // Offset of the tile that counts this corner's hat as number `hat`; a tile two away is reached through one adjacent to both.
             let off = [hat / (HATS * HATS), hat / HATS % HATS, hat % HATS].map(|hat| 1 - hat as i32);
             let first = off.map(|x| x.max(-1));
             let next = [0, 1, 2].map(|axis| off[axis] - first[axis]);

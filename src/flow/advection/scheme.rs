@@ -18,7 +18,7 @@ pub enum Scheme {
 pub struct AdvectionStep<'a> {
     /// Velocity (m/s) of the air outside all tiles.
     pub ambient: [f32; 3],
-    /// Displacement (cells) per speed (m/s): the time over the cell's edge (s/m).
+    /// Displacement (cells) per speed (m/s): the time divided by the cell's edge (s/m).
     pub scale: f32,
     pub scheme: Scheme,
     /// The surrounding air after the step.

@@ -130,7 +130,7 @@ impl Operator {
             let is_solid =
                 stencil.is_some_and(|stencil| fine_cells.iter().all(|at| stencil.inverse[*at] == 0.0));
             out.outside[cell >> 6] |= u64::from(is_outside) << (cell & 63);
-            // Marks cells that do not take part, until `complete_stencils` inverts the diagonal.
+            // Marks the cells that take part, until `complete_stencils` inverts the diagonal.
             out.inverse[cell] = f32::from(u8::from(!is_outside && !is_solid));
             let Some(stencil) = stencil else { continue };
             for axis in 0..3 {
@@ -223,8 +223,8 @@ impl Operator {
         });
     }
 
-    /// Factor from the finer level to this one of the weight of a face to the outside. The outside pressure is known half a finest cell
-    /// behind the last face, so that the weight is 2 / (1 + 2^-level), relative to a face between two cells.
+    /// Factor by which the weight of a face to the outside changes from the finer level to this one. The outside pressure is known half a
+    /// finest cell behind the last face, so that the weight is 2 / (1 + 2^-level), relative to a face between two cells.
     fn outside_factor(&self) -> f32 {
         let share = |level: i32| 2.0 / (1.0 + 0.5f32.powi(level));
         share(self.level) / share(self.level - 1)

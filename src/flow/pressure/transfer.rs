@@ -51,7 +51,7 @@ fn add_tile(window: &Window, corner: [i32; 3], stencil: Option<&Stencil>, out: &
     dispatch!(add_rows(window: &Window, corner: [i32; 3], stencil: Option<&Stencil>, out: &mut Tile))
 }
 
-/// A fine cell takes 3/4 of the coarse cell that contains it and 1/4 of the nearest other one.
+/// Along each axis, a fine cell takes 3/4 of the coarse cell that contains it and 1/4 of the nearest other one.
 #[inline(always)]
 fn add_rows(window: &Window, corner: [i32; 3], stencil: Option<&Stencil>, out: &mut Tile) {
     let two = |fine: usize| (fine / 2 + 1, fine / 2 + 2 * (fine & 1));
