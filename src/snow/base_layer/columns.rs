@@ -46,7 +46,7 @@ impl Heights {
         }
     }
 
-    /// Adds the snow of a grid at a block.
+    /// Adds the snow of a block of a grid.
     pub fn add_probe(&mut self, probe: &Probe<'_>, cell: f32) {
         match probe {
             Probe::Leaf(leaf) => self.add(leaf.values, cell),
@@ -125,7 +125,7 @@ pub fn touched(initial: &FloatGrid, changed: &HashSet<Origin>, low: i32, high: i
 }
 
 /// Volume of a level set's solid (m3): filled fractions of cells, summed leaf by leaf in the tree's order, plus full blocks without a leaf,
-/// within the blocks from one voxel to another.
+/// from the block of voxel `low` to that of voxel `high`.
 pub fn volume(surface: &FloatGrid, low: [i32; 3], high: [i32; 3]) -> Result<f64> {
     let cell = surface.voxel_size() as f32;
     let leaves = surface.leaves()?;

@@ -117,7 +117,7 @@ pub fn remove(
     Ok(islands.len())
 }
 
-/// A voxel of each connected component of the snow within a block that has fewer than `min_voxels` voxels.
+/// A voxel of each connected component of a block's snow, if the component has fewer than `min_voxels` voxels.
 fn small_components(block: &BlockEdit, min_voxels: usize) -> Vec<Voxel> {
     let BlockEdit::Dense(block) = block else {
         // All snow (at least 512 voxels), or no snow.
@@ -223,7 +223,7 @@ impl Region {
         self.values[self.position(voxel)]
     }
 
-    /// Upper bounds on a voxel's distances (m) to islands and to the rest, from the snow within reach: a distance field changes no faster
+    /// Upper bounds on a voxel's distances (m) to islands and to other snow, from the snow within reach: a distance field changes no faster
     /// than the position.
     fn bounds(&self, voxel: Voxel, scale: Scale) -> [f32; 2] {
         let mut bounds = [f32::INFINITY; 2];

@@ -45,7 +45,8 @@ const EVERYWHERE: Window = Window { min: [i32::MIN; 3], max: [i32::MAX; 3] };
 /// Level set of the snow on a ground and on static objects.
 ///
 /// # Errors
-/// A depth or an area that is not positive or less than a cell, an empty mesh, no snow at all, a layer that is too large, cancel.
+/// A depth, or a side of the area, that is not positive or is less than a cell; an empty mesh, no snow at all, a layer that is too large,
+/// cancel.
 pub fn layer(
     ctx: &Context,
     ground: &Ground,
@@ -227,7 +228,7 @@ fn centre(sheet: &Sheet) -> Result<DVec3> {
 }
 
 /// A mesh with its intended orientation: closed components with their faces outward, sheets with their faces upward. What remains
-/// ambiguous is a warning of the context.
+/// ambiguous is reported as a warning.
 fn upright(ctx: &Context, mut sheet: Sheet) -> Sheet {
     let same = coincident(sheet.positions.iter().copied());
     let mut orientation = Orientation::of(&sheet.positions, &sheet.triangles, &same, Closing::Caps);
@@ -248,7 +249,8 @@ fn upright(ctx: &Context, mut sheet: Sheet) -> Sheet {
     sheet
 }
 
-/// Adds the prism that each triangle sweeps from one position to the other, along its normal; `weight` is what it adds to winding numbers.
+/// Adds the prism that each triangle sweeps outward (along its normal) from one position to the other; `weight` is what the prism adds to
+/// winding numbers.
 fn prisms(
     ctx: &Context,
     lattice: &Lattice,

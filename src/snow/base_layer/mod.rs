@@ -240,8 +240,8 @@ impl BaseLayer {
         self.changes.volume
     }
 
-    /// Removes what bodies sweep from `from` to `to` (s), or their pose if the two are equal. A step that fails or is cancelled leaves the
-    /// layer unchanged.
+    /// Removes what bodies sweep from `from` to `to` (s), or what they fill if the two times are equal. A step that fails or is cancelled
+    /// leaves the layer unchanged.
     ///
     /// # Errors
     /// A pose that cannot be computed, a body that is too far away, cancel, memory.

@@ -64,8 +64,8 @@ impl Displacement {
         self.amplitude * sum.clamp(0.0, 1.0)
     }
 
-    /// Displaces pieces outward, then scales their values back to distances (first order): the work of one phase, which a cancel leaves
-    /// incomplete.
+    /// Displaces pieces outward, then scales their values back to distances (first order). This is the work of one phase; after a cancel
+    /// it is incomplete.
     pub fn apply(&self, ctx: &Context, pieces: &mut [Piece], half_width: f32) {
         if self.amplitude == 0.0 {
             return;
@@ -150,7 +150,7 @@ fn near_origin(ctx: &Context, grid: &FloatGrid) -> Result<(Option<FloatGrid>, [i
     Ok((Some(near), shift))
 }
 
-/// Divides each value by the gradient there, so that values near the surface are distances again.
+/// Divides each value by the length of the gradient there, so that values near the surface are distances again.
 fn normalise(pieces: &mut [Piece]) {
     let indices: HashMap<Origin, usize> =
         pieces.iter().enumerate().map(|(index, piece)| (piece.origin(), index)).collect();
@@ -205,7 +205,7 @@ fn normalised(origin: Origin, values: &Values, pieces: &[Piece], indices: &HashM
     out
 }
 
-/// Godunov's choice of the one-sided difference that points away from the surface.
+/// Square of the one-sided difference on the side of the surface (Godunov's choice).
 fn upwind_squared(below: f32, above: f32, outside: bool) -> f32 {
     let (below, above) = if outside { (below, above) } else { (-below, -above) };
     let (below, above) = (below.max(0.0), above.min(0.0));

@@ -110,7 +110,7 @@ fn reconstructed(values: &Values, at: [usize; 3], cell: f32, unseen: f32) -> f32
 }
 
 /// The slope beyond the border (dimensionless), from the values in the voxel's layer there: the gradient of distances has length 1. None if
-/// the slope before the border is consistent.
+/// the slope before the border agrees with this or is near 0.
 fn slope_beyond_border(
     layer: &[[f32; PARTS]; PARTS],
     [first, second]: [usize; 2],

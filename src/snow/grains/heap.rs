@@ -162,7 +162,7 @@ impl Heap {
         self.make_room(ctx, colliders, MAX_IN_CELL_BEFORE)?;
         let Colliders { floor, field, shells } = colliders;
         let mut field = field.as_ref().map(|field| CachedField::new(field, self.diameter));
-        // Distance (diameters) at 1 m/s.
+        // Distance (diameters) that a grain at 1 m/s moves while its pairs should last.
         let ahead = (f64::from(SUB_STEPS_AHEAD) * dt / self.diameter) as f32;
         let mut layout = self.sort_into_blocks(ahead);
         // Largest travel of the meshes in the step so far (diameters).

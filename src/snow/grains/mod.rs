@@ -385,7 +385,7 @@ impl Grains {
         });
     }
 
-    /// Positions (m), in the order of [`Grains::points`], like all that follow.
+    /// Positions (m). The values of each grain, here and below, are in the order of [`Grains::points`].
     pub fn positions(&self) -> impl Iterator<Item = DVec3> + '_ {
         self.heap.positions()
     }

@@ -45,7 +45,7 @@ pub struct Params {
     pub seed: u64,
 }
 
-/// Maximum g dt^2 / d of a sub-step: a grain at rest falls by this fraction of its diameter.
+/// Maximum g dt^2 / d of a sub-step: a grain that starts to fall moves by at most this fraction of its diameter.
 const FALL: f64 = 0.02;
 /// Maximum displacement of an object in a sub-step (diameters).
 const MAX_OBJECT_STEP: f64 = 2.0;
@@ -159,7 +159,7 @@ const SLIDING_SHARE: f64 = 0.8;
 /// Square of the speed above which a grain slides, in diameters times gravity: the speed is a tenth of that at which it could rise by half
 /// a diameter.
 const SLIDES: f64 = 0.01;
-/// Minimum speed of a bounce, in sub-steps of gravity.
+/// Minimum approach speed of a bounce, as a multiple of the speed that gravity adds in a sub-step.
 const BOUNCING: f64 = 4.0;
 /// Maximum gap (diameters) at which grains attract each other.
 const ATTRACTION_GAP: f32 = 0.05;

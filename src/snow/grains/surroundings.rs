@@ -33,7 +33,7 @@ pub struct Object<'a> {
     pub body: &'a Body,
     /// Friction of grains against it.
     pub friction: f64,
-    /// Acceleration up to which it holds grains that touch it (weights of a grain).
+    /// Acceleration up to which it holds grains that touch it (multiples of gravity).
     pub stick: f64,
     /// Share of the snow it removes that does not become grains; none: [`Params::compression`].
     pub compression: Option<f64>,

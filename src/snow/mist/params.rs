@@ -15,7 +15,7 @@ pub struct Params {
     pub from_speed: f64,
     /// Whether falling grains raise mist too.
     pub falling: bool,
-    /// Acceleration (m/s2) of the air where there is mist, upward: the thesis' g_mist.
+    /// Acceleration (m/s2) of the air where there is mist, negative downward: the thesis' g_mist.
     pub gravity: f64,
     /// Time (s) in which half of the mist dissipates; infinite: it stays.
     pub half_life: f64,

@@ -45,7 +45,7 @@ pub fn base(ctx: &Context, surface: &FloatGrid) -> Result<FloatGrid> {
 /// outside it. `voxel` (m) is at most half of the radius.
 ///
 /// # Errors
-/// A radius that is not above 0; a voxel that is not above 0 or too large; centres that are not finite or too far from the
+/// A radius that is not above 0; a voxel that is not above 0, or is too large; centres that are not finite or too far from the
 /// origin; cancel; when memory runs out.
 pub fn grains(ctx: &Context, centres: &[DVec3], radius: f64, voxel: f64) -> Result<FloatGrid> {
     if !(radius > 0.0 && radius.is_finite()) {
@@ -54,7 +54,7 @@ pub fn grains(ctx: &Context, centres: &[DVec3], radius: f64, voxel: f64) -> Resu
     // A product with a radius may be off in its last bit.
     if !(voxel > 0.0 && voxel <= VOXEL * radius * (1.0 + 1.0e-9)) {
         return Err(Error::argument(format!(
-            "voxels of {voxel} m are not above 0 and at most half of the grains' radius of {radius} m"
+            "voxels must be above 0 m and at most half of the grains' radius of {radius} m, not {voxel} m"
         )));
     }
     let full = radius / voxel;

@@ -26,12 +26,13 @@ pub struct Spheres {
 pub struct SquaredDistances {
     /// Minimum corner, in voxels.
     pub origin: Origin,
-    /// The distances.
+    /// The squared distances.
     pub values: Box<Values>,
 }
 
 impl Spheres {
-    /// Sorts centres (m) into cubes of `edge` blocks of a grid with voxels of `voxel` m; distances up to `reach` voxels count.
+    /// Sorts centres (m) into cubes, `edge` blocks wide, of a grid with voxels of `voxel` m; distances beyond `reach` voxels are not
+    /// needed.
     ///
     /// # Errors
     /// A centre that is not finite, or is too far from the origin for voxels of this size; cancel.
@@ -83,7 +84,7 @@ impl Spheres {
         self.cubes.iter().map(|(cube, _)| *cube)
     }
 
-    /// The squared distances in the blocks of a cube within reach of a centre, in ascending order of their origins.
+    /// The squared distances in those blocks of a cube that may be within reach of a centre, in ascending order of origins.
     pub fn squared_distances(&self, cube: [i32; 3]) -> Vec<SquaredDistances> {
         let Ok(index) = self.cubes.binary_search_by_key(&cube, |(cube, _)| *cube) else { return Vec::new() };
         let begin = if index == 0 { 0 } else { self.cubes[index - 1].1 };
@@ -101,7 +102,7 @@ impl Spheres {
             .collect()
     }
 
-    /// Lowers the squared distances in the blocks of a cube to those from a centre.
+    /// Lowers the squared distances in the blocks of a cube to those from a centre where these are smaller.
     fn add(&self, blocks: &mut [Option<Box<Values>>], centre: [f32; 3]) {
         let last = (self.edge * DIM) as f32 - 1.0;
         let low = centre.map(|at| (at - self.reach).ceil().clamp(0.0, last) as usize);

@@ -13,7 +13,7 @@ use crate::numeric::blocks::{Block, BlockEdit, DIM, Origin, VOXELS, Values, offs
 use crate::numeric::checks::ensure;
 use crate::vdb::{FloatGrid, Probe};
 
-/// Maximum voxel size (radii of a grain): spheres of less than one and a half voxels are lost between the voxels.
+/// Maximum voxel size (radii of a grain): spheres with a radius of less than one and a half voxels are lost between the voxels.
 const VOXEL: f64 = 1.0 / 1.5;
 /// Radius with which a grain becomes part of the surface (radii): grains touch only in points, which no grid can represent. Grown by a
 /// quarter, two touching grains share a neck of three quarters of a radius, and a grain a tenth of a diameter above the base is joined to
@@ -40,7 +40,7 @@ pub fn unite(ctx: &Context, base: &FloatGrid, centres: &[DVec3], radius: f64) ->
     let cell = base.voxel_size();
     ensure(
         base.is_world_fixed() && f64::from(base.background()) >= 2.0 * cell,
-        "the base must be a level set on world-fixed cells, at least two cells wide on each side",
+        "the base must be a level set on world-fixed cells with a band of at least two cells on each side",
     )?;
     if !(radius.is_finite() && radius >= 0.01 * cell) {
         return Err(Error::argument(format!("grains of {radius} m are too small for cells of {cell} m")));
@@ -103,7 +103,7 @@ impl Fine {
         out
     }
 
-    /// A block of the surface; none if it is not near.
+    /// A block of the grid; none if the surface is not near it.
     fn block(
         &self,
         origin: Origin,

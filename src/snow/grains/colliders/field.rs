@@ -60,7 +60,7 @@ impl<'a> CachedField<'a> {
         Self { field, patches: Vec::new(), diameter }
     }
 
-    /// Touches of the members of `which` blocks that are near the surface. `reach` is the distance (diameters) that a grain
+    /// Touches of members of the blocks `which` with a surface nearby. `reach` is the distance (diameters) that a grain
     /// at 1 m/s may move.
     ///
     /// # Errors
@@ -213,7 +213,7 @@ impl<'a> Window<'a> {
         self.probes.iter().any(|probe| matches!(probe, Probe::Leaf(_)))
     }
 
-    /// Whether some of it may be inside.
+    /// Whether a part of the window may be inside the level set.
     pub fn has_inside(&self) -> bool {
         let may = |probe: &Probe<'_>| match probe {
             Probe::Leaf(_) => true,

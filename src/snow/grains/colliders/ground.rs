@@ -33,7 +33,7 @@ impl Ground {
         Self { shell: Shell::ground(FRICTION, triangles, rims, positions.clone()) }
     }
 
-    /// Whether a mesh bounds a solid, so that it can be ground: each of its edges lies between two faces.
+    /// Whether a mesh bounds a solid, so that it can be ground: each of its edges belongs to an even number of faces.
     pub fn is_solid(mesh: &TriMesh) -> bool {
         let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
         !mesh.triangles.is_empty() && HalfEdges::of(&mesh.triangles, &positions).is_closed()

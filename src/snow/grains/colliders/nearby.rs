@@ -36,7 +36,7 @@ struct Boxes {
 }
 
 impl Nearby {
-    /// Collects the leaves of a mesh that may be within a distance (m), plus their displacement, of positions in a box.
+    /// Collects each leaf of a mesh that may be within a distance (m), plus the leaf's displacement, of a position in a box.
     pub fn find(&mut self, shell: &Shell, [low, high]: &[DVec3; 2], within: f64) {
         let margin = DVec3::repeat(within + shell.max_displacement);
         let bounds = [low - margin, high + margin];
@@ -237,7 +237,7 @@ fn reach(boxes: &[Boxes], position: [f32; 3], within: f32, out: &mut Vec<(u32, f
     dispatch!(reach_of(boxes: &[Boxes], position: [f32; 3], within: f32, out: &mut Vec<(u32, f32)>))
 }
 
-/// The boxes within a distance (m), plus their displacement, of a position, with the squares of their distances (m2).
+/// Each box within a distance (m), plus the box's displacement, of a position, with the square of its distance (m2).
 #[inline(always)]
 fn reach_of(boxes: &[Boxes], position: [f32; 3], within: f32, out: &mut Vec<(u32, f32)>) {
     out.clear();

@@ -37,7 +37,7 @@ pub struct Search<'a> {
     pub diameter: f64,
     /// Length of the sub-step (s).
     pub dt: f64,
-    /// Largest travel of the meshes in the step before this sub-step (diameters): the sum of [`Travel::max`].
+    /// Largest travel of the meshes from the start of the step to this sub-step (diameters): the sum of [`Travel::max`].
     pub before: f64,
     /// The same in this sub-step.
     pub travel: Travel,
@@ -81,8 +81,8 @@ impl Travel {
 /// search too often.
 const MAX_RATIO: f64 = 1.2;
 
-/// Maximum distance (diameters) from the middle of a block to a mesh that its members touch: they have left the block by less than two
-/// diameters.
+/// Maximum distance (diameters) from the middle of a block to a mesh that its members touch: a member may have left the block, by less than
+/// two diameters.
 pub fn block_reach() -> f64 {
     0.5 * f64::from(EDGE) * 3f64.sqrt() + REACH + 2.0
 }

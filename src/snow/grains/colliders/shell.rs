@@ -25,7 +25,7 @@ pub struct Shell {
     pub collider: u32,
     /// Friction against it.
     pub friction: f32,
-    /// Acceleration up to which it holds grains that touch it (weights of a grain).
+    /// Acceleration up to which it holds grains that touch it (multiples of gravity).
     pub stick: f32,
     triangles: Vec<[u32; 3]>,
     /// Whether it has an inside.
@@ -132,7 +132,7 @@ impl Shell {
         self.nearest(position, within).map(|found| found.square.sqrt())
     }
 
-    /// Sets the acceleration up to which the surface holds grains (weights of a grain).
+    /// Sets the acceleration up to which the surface holds grains (multiples of gravity).
     pub fn with_stick(self, stick: f32) -> Self {
         Self { stick, ..self }
     }
@@ -199,7 +199,7 @@ impl Shell {
         (self.max_displacement, self.displacement_bounds) = (square.sqrt(), bounds);
     }
 
-    /// The touch of the grain in a slot with the plane through a nearest point.
+    /// The contact between the grain in a slot and the plane through a nearest point.
     pub fn touch(
         &self,
         slot: u32,
@@ -280,7 +280,7 @@ impl Shell {
         best.found.map(|found| self.resolve(found, position))
     }
 
-    /// Compares the triangles of a leaf with the best so far and with the square of a reach (m2).
+    /// Compares the triangles of a leaf with the best so far; `reach` is the square of the maximum distance (m2).
     fn compare_all(&self, leaf: usize, position: DVec3, reach: f64, best: &mut Best) {
         let first = leaf * LEAF;
         for index in first..(first + LEAF).min(self.triangles.len()) {
@@ -288,7 +288,7 @@ impl Shell {
         }
     }
 
-    /// Compares a triangle with the best so far and with the square of a reach (m2).
+    /// Compares a triangle with the best so far; `reach` is the square of the maximum distance (m2).
     pub(in crate::snow::grains) fn compare(
         &self,
         index: usize,
@@ -319,8 +319,8 @@ impl Shell {
         }
     }
 
-    /// Visits the leaves that may be within a distance (m), plus their displacement, of positions in a box: each with its box
-    /// and displacement (m).
+    /// Visits each leaf that may be within a distance (m), plus the leaf's largest displacement, of a position in the given
+    /// box; `visit` gets the leaf, its own bounding box and that displacement (m).
     pub(in crate::snow::grains) fn for_each_leaf(
         &self,
         [low, high]: &[DVec3; 2],
@@ -458,6 +458,6 @@ fn nearest_weights(position: DVec3, a: DVec3, b: DVec3, c: DVec3) -> [f64; 3] {
     if sum <= 0.0 { [1.0, 0.0, 0.0] } else { [va / sum, vb / sum, vc / sum] }
 }
 
-/// Bits of a triangle's sides and corners that belong to the rim of a sheet: bit k is the side opposite to corner k, bit
-/// 3 + k the corner.
+/// First bit of the corners in the byte that tells which parts of a triangle lie on the rim of a sheet: bit k stands for the
+/// side opposite to corner k, bit 3 + k for corner k.
 pub const RIM_CORNER: u8 = 3;

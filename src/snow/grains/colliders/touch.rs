@@ -19,7 +19,7 @@ pub struct Touch {
     pub friction: f32,
     /// Friction in this sub-step.
     pub friction_now: f32,
-    /// Acceleration up to which the collider holds the grain (weights of the grain).
+    /// Acceleration up to which the collider holds the grain (multiples of gravity).
     pub stick: f32,
     /// Whether no grain may be behind the plane at the end of a sub-step: ground.
     pub is_ground: bool,

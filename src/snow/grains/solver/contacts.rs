@@ -359,7 +359,7 @@ impl Scratch {
         false
     }
 
-    /// Puts each pair into the first batch that is not full after those of its grains' earlier pairs.
+    /// Puts each pair into the first batch with a free lane after those of its grains' earlier pairs.
     fn schedule(&mut self, members: &[u32], batches: &mut Vec<Batch>) {
         let Self { starts, pairs, first_allowed, counts, next_free } = self;
         counts.clear();

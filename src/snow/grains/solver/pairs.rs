@@ -20,7 +20,7 @@ pub(super) const SLOT_BITS: u32 = 26;
 pub struct Batch {
     /// Slots of the owners: for each pair the grain in the later block (by y, x, z) or, within one block, the later member.
     pub owners: [u32; LANES],
-    /// Slots of the other grains, with the step to their block above.
+    /// Slots of the other grains; the bits above the slot hold the step to the grain's block.
     pub codes: [u32; LANES],
     /// Impulses on the owners (m/s, for a grain of unit mass).
     pub impulse: [Lanes; 3],

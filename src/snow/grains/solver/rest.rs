@@ -1,6 +1,6 @@
 //! Rest (thesis section 3.3.3) as part of the model: a grain that has stayed within a small part of its diameter for a while
-//! stops and supports others like the ground. It takes longer if nothing supports it from below, only friction from the
-//! sides, say; without gravity, such a grain floats and never rests. A resting grain wakes when a moving neighbour or a
+//! stops and supports others like the ground. It takes longer if nothing supports the grain from below (but, say, friction
+//! from the sides does); without gravity, such a grain floats and never rests. A resting grain wakes when a moving neighbour or a
 //! moving surface touches it, and when the base layer near it changes; a change of gravity or material, or an object that
 //! comes, goes or jumps, wakes all. Resting grains with no neighbour awake are skipped: that only saves time and never
 //! changes the result.

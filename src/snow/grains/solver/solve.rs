@@ -147,8 +147,8 @@ fn begin_touch(row: &mut Row, touch: &mut Touch, c: &Coefficients) {
 /// friction. A real grain that slides would roll, which these cannot. A sliding grain therefore gets the friction between grains, which is
 /// lower for the same reason, plus the slope of the surface. So it stops wherever a grain can lie, and slides by Coulomb's law where none
 /// can. With full friction, columns that collapse run out a third less far than in experiments, where the ground does not matter (Lube et
-/// al. 2004): their lowest layer never moves. Two kinds keep full friction: grains that attract each other, which stick together and do not
-/// roll, and those on a moving collider, which carries them along with its own friction.
+/// al. 2004): their lowest layer never moves. Two kinds of grains keep full friction: those that attract each other, which stick together
+/// and do not roll, and those on a moving collider, which carries them along with its own friction.
 fn friction(row: &Row, touch: &Touch, c: &Coefficients) -> f32 {
     if c.attraction > 0.0 || touch.velocity != [0.0; 3] {
         return touch.friction;
@@ -211,7 +211,7 @@ fn advance_grain(row: &mut Row, c: &Coefficients, motion: &Motion) {
     row.position = add(row.position, displacement);
     // The travel that is compared with the limit includes that of the common displacement, though the grain may move along.
     row.travel_limit += norm(motion.mesh_displacement) - norm(sub(displacement, motion.mesh_displacement));
-    // Its square may be over 0 in diameters and underflow to 0 in m/s.
+    // The square of a push may be over 0 in diameters and underflow to 0 in m/s.
     let back = scaled(row.push, c.diameter / c.dt);
     let square = dot(back, back);
     if row.is_supported() && square > 0.0 {

@@ -20,7 +20,7 @@ const RELEASED_SHARE: f64 = 0.98;
 const MAX_ROUNDS: usize = 16;
 /// Maximum displacement of a released grain (diameters).
 const MAX_DISPLACEMENT: f64 = 1.5;
-/// Cosine between the outward directions on the two sides of a mesh.
+/// Two positions are on opposite sides of a mesh if the cosine between its outward directions there is below this.
 const OPPOSITE: f64 = -0.5;
 
 /// The surfaces around a block at the end of the step.

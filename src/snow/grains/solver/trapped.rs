@@ -33,8 +33,8 @@ pub struct StepEnd<'a> {
 }
 
 impl StepEnd<'_> {
-    /// Members of each block that may be inside a surface, with the level set as the blocks saw it; `trapped_before` has the identities of
-    /// the grains that the last step left trapped, ascending.
+    /// Members of each block that may be inside a surface; `field` is the level set that the sub-steps read, and `trapped_before` has the
+    /// identities of the grains that the last step left trapped, ascending.
     pub fn deep(
         &self,
         rows: &[Row],

@@ -1,5 +1,5 @@
-//! Sources of mist (thesis section 3.4.2): it is raised in a tube of twice the grain's radius along the path of each fast grain within the
-//! frame.
+//! Sources of mist (thesis section 3.4.2): it is raised in a tube with twice the grain's radius along the path of each fast grain within
+//! the frame.
 
 pub(super) mod new_mist;
 
@@ -14,8 +14,8 @@ use crate::numeric::checks::ensure;
 
 /// Maximum coordinate of a grain (cells).
 const MAX_CELL: f64 = 1e7;
-/// Maximum acceleration (m/s2) of a grain in free flight, under gravity and air drag. A grain with at least twice this is assumed to
-/// collide.
+/// Maximum acceleration (m/s2) of a grain in free flight, under gravity and air drag. A grain with at least twice this acceleration is
+/// assumed to collide.
 const FREE_ACCELERATION: f64 = 20.0;
 /// Largest radius of a grain (cells).
 const MAX_RADIUS: f64 = 64.0;
@@ -102,12 +102,12 @@ impl Source {
 }
 
 /// The motion of a grain in a step: its velocity changes once, uniformly over an interval. The interval is centred on the moment for which
-/// both velocities lead as close as possible to its end position; it is the whole step for a grain in flight and an instant for one
+/// both velocities lead as close as possible to the grain's end position; it is the whole step for a grain in flight and an instant for one
 /// that collides.
 struct Motion {
     /// Position (m) at the beginning.
     from: DVec3,
-    /// Displacement (m) over a whole step at the first velocity, and by how much that at the last velocity differs.
+    /// Displacement (m) over a whole step at the first velocity; at the last velocity it is larger by `gain`.
     before: DVec3,
     gain: DVec3,
     /// Centre and length of the interval: shares 0..=1 of the step.

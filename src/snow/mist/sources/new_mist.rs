@@ -6,7 +6,7 @@ use super::Seed;
 use crate::flow::{Coord, tiles};
 use crate::snow::mist::Mist;
 
-/// Seeds of a density and a velocity (m/s) at each cell of tiles.
+/// New mist in tiles: `of` returns the density and the velocity (m/s) of a cell.
 pub fn seeds(tiles: &[Coord], of: impl Fn([i32; 3]) -> (f32, [f32; 3])) -> Vec<Seed> {
     let seed = |coord: &Coord| {
         let (mut density, mut velocity) = (Box::new([0.0; 512]), Box::new([[0.0; 512]; 3]));
@@ -23,7 +23,7 @@ pub fn seeds(tiles: &[Coord], of: impl Fn([i32; 3]) -> (f32, [f32; 3])) -> Vec<S
 
 impl Mist {
     /// Adds new mist to air whose tiles exist: the larger density is kept, and the air takes on the new mist's velocity in proportion to
-    /// how far the mist fills the cells.
+    /// how much of the cells the mist fills.
     pub(in crate::snow::mist) fn add_seeds(&mut self, seeds: &[Seed]) {
         let coords: Vec<Coord> = seeds.iter().map(|seed| seed.coord).collect();
         let (tiles, velocity, density) = self.flow.fields();

@@ -32,7 +32,7 @@ pub struct Surroundings<'a> {
     pub base: Option<&'a FloatGrid>,
     /// Objects, moving or not.
     pub bodies: &'a [&'a Body],
-    /// Whether each of them removes the snow that it moves through; objects beyond the end of this list do not.
+    /// Whether each object removes the snow that it moves through; objects beyond the end of this list do not.
     pub removing: &'a [bool],
     /// Height of a level ground plane (m).
     pub floor: Option<f64>,
@@ -114,7 +114,7 @@ const MAX_SPACING: f64 = 2.9;
 const MAX_PARTS: usize = 4;
 
 impl<'a> Surroundings<'a> {
-    /// The walls in a step from `from` to `to` (s), for cells of an edge (m) and wider ones.
+    /// The walls in a step from `from` to `to` (s), for cells `cell` m wide and wider ones.
     ///
     /// # Errors
     /// A pose that cannot be computed.
@@ -159,7 +159,7 @@ impl<'a> StepBody<'a> {
 }
 
 impl Walls<'_> {
-    /// Open fractions and speeds of faces at a share 0..=1 of the step, for tiles with cells of an edge (m).
+    /// Open fractions and speeds of faces at a share 0..=1 of the step, for tiles with cells `cell` m wide.
     ///
     /// # Errors
     /// A pose that cannot be computed; cancel; errors of a grid.
