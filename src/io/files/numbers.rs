@@ -104,7 +104,7 @@ impl Kind {
                 let before = values.len();
                 extend!(values, i64, i64);
                 if let Some(value) = values[before..].iter().find(|value| **value < 0) {
-                    return Err(format!("the integer {} is over 2^63", *value as u64));
+                    return Err(format!("the integer {} is over 2^63 - 1", *value as u64));
                 }
             }
             _ => unreachable!("numbers are made by the kind that fills them"),

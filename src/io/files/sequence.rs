@@ -32,7 +32,7 @@ impl Pattern {
         };
         let digits_at = |start: usize| text[start..].bytes().take_while(u8::is_ascii_digit).count();
         let width = |digits: &str| if digits.is_empty() { Some(1) } else { digits.parse().ok() };
-        // A % without digits and a d behind it is a part of the name.
+        // A % that is not followed by a d, with or without digits before it, is a part of the name.
         for (start, _) in text.rmatch_indices('%') {
             let end = start + 1 + digits_at(start + 1);
             if text[end..].starts_with('d') {
@@ -69,7 +69,7 @@ impl Pattern {
             let number =
                 name.to_str().and_then(|name| name.strip_prefix(&*self.before)?.strip_suffix(&*self.after));
             let frame = number.and_then(|number| number.parse::<i32>().ok());
-            // "+1", or "001" with four digits, are not frame numbers.
+            // "+1", or "001" where four digits are expected, is not a frame number.
             out.extend(frame.filter(|frame| self.path(*frame).file_name() == Some(&*name)));
         }
         out.sort_unstable();

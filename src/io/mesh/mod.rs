@@ -124,8 +124,8 @@ pub fn write(path: &Path, mesh: &TriMesh) -> Result<()> {
     write_carried(path, mesh, &Carried::default())
 }
 
-/// As [`write()`], with the data that the mesh carries, as far as the format can hold them: .ply everything, .obj texture coordinates (see
-/// [`holds_uvs`]) and colours.
+/// As [`write()`], with the data that the mesh carries, as far as the format can hold them: .ply holds everything, .obj texture coordinates
+/// (see [`holds_uvs`]) and colours, .stl nothing.
 ///
 /// # Errors
 /// As [`write()`].

@@ -59,7 +59,8 @@ fn continued_statement(line: &[u8]) -> Option<&[u8]> {
     (is_read && !begin.contains(&b'#')).then_some(begin)
 }
 
-/// Whether this is a file that frazil wrote for a mesh without vertices; any other text has no vertices either.
+/// Whether this is a file that frazil wrote for a mesh without vertices: having no vertices proves nothing, as unrelated text has none
+/// either.
 pub(in crate::io) fn is_our_empty_file(bytes: &[u8]) -> bool {
     bytes == EMPTY
 }
@@ -160,7 +161,7 @@ fn number(word: &[u8]) -> Option<f32> {
     text::number(word)
 }
 
-/// A zero-based index from one that counts from 1, or backward from the last.
+/// A zero-based index from one that counts from 1 or, if negative, backward from the last.
 fn index(word: &[u8], count: usize) -> Option<u32> {
     let number: i64 = std::str::from_utf8(word).ok()?.parse().ok()?;
     let index = if number < 0 { count as i64 + number } else { number - 1 };

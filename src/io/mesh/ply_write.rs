@@ -9,7 +9,7 @@ use crate::geometry::{TriMesh, Uvs, Vec3};
 /// The data that a mesh carries into a file besides its positions.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Carried<'a> {
-    /// Velocities (m/s), one a vertex, as vx, vy, vz; or none.
+    /// Velocities (m/s), one per vertex, as vx, vy, vz; or none.
     pub velocities: &'a [Vec3],
     /// Texture coordinates: s and t of the vertices or, if there are seams, a list texcoord of the faces.
     pub uvs: Option<&'a Uvs>,

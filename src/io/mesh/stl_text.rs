@@ -84,7 +84,7 @@ impl<'a> Reader<'a> {
     }
 
     fn unexpected(&self, word: &[u8], wanted: &str) -> String {
-        format!("line {}: \"{}\" where {wanted} must stand", self.words.line, text::shown(word))
+        format!("line {}: \"{}\" where {wanted} is expected", self.words.line, text::shown(word))
     }
 
     /// Reads the rest of a facet after its first word.

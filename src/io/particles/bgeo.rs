@@ -2,7 +2,7 @@
 //! under the same name, which is refused.
 //!
 //! All numbers are big-endian: a header of counts, the attributes of points by name, size and type, then for each point x, y, z, w and its
-//! attributes, 4 bytes a number. w, the weight of control points of curves, is ignored, as is everything after the points.
+//! attributes, 4 bytes per number. w, the weight of control points of curves, is ignored, as is everything after the points.
 
 use std::io::{ErrorKind, Read, Write};
 
@@ -157,7 +157,7 @@ impl Field {
             4 => None,
             2 | 3 => {
                 return Err(format!(
-                    "attribute \"{name}\" is of texts that are not in a list, which are not read"
+                    "attribute \"{name}\" holds texts that are not in a list; these are not read"
                 ));
             }
             _ => return Err(format!("the file is damaged: attribute \"{name}\" is of type {number}")),

@@ -11,7 +11,8 @@
 //!
 //! Attributes keep the names of the file. Floats become 32-bit, positions stay 64-bit. Signed integers of up to 32 bits become 32-bit,
 //! longer ones 64-bit. As in .ply, `id` becomes 64-bit integers, `active` and `trapped` become `bool`, and a value that all points share is
-//! stored once. Attributes with a number of components other than one or three, texts, and attributes named `P` or without a name are named
+//! stored once. Attributes with a number of components other than one or three, texts, and attributes named `P` or without a name are
+//! listed
 //! in a warning and left out.
 
 mod bgeo;
@@ -194,7 +195,7 @@ fn listed(extensions: &[&str]) -> String {
     extensions.iter().map(|extension| format!(".{extension}")).collect::<Vec<_>>().join(", ")
 }
 
-/// Rounding of a position (m) that causes a warning.
+/// Maximum rounding of a position (m) without a warning.
 const MAX_ROUNDING: f64 = 1e-3;
 
 fn warn_of_rounding(path: &Path, points: &Points) {
@@ -271,7 +272,8 @@ fn vectors(all: impl Iterator<Item = [f32; 3]>) -> Values {
     Values::Vector(shared(all.collect(), |v| v.map(f32::to_bits)))
 }
 
-/// An attribute of one number for each particle: its type depends on its name, on that of the numbers, and on whether integers fit 32 bits.
+/// An attribute of one number for each particle: its type depends on its name, on the type of the numbers, and on whether integers fit 32
+/// bits.
 fn scalars(name: &str, numbers: Numbers, fits_int: bool) -> Parsed<Values> {
     Ok(match (name, numbers) {
         ("id", Numbers::Floats(numbers)) => Values::Long(shared(integers(name, &numbers)?, |&id| id)),

@@ -2,7 +2,7 @@
 //!
 //! A vector attribute takes three properties, its name with x, y and z appended (`v`: vx, vy, vz; `rest`: restx ...). `bool` becomes
 //! `uchar`. PLY has no 64-bit integers: they become `int` if all of them fit, else `double`. A comment holds the voxel size. Positions are
-//! `float`, or `double` if 32 bits would move points by over a thousandth of a voxel.
+//! `float`, or `double` where adjacent 32-bit numbers are over a thousandth of a voxel apart.
 
 use std::io::Write;
 use std::path::Path;
@@ -20,7 +20,7 @@ use crate::io::mesh::ply::Element;
 
 /// Prefix of the comment with the voxel size (m).
 const VOXEL: &str = "frazil voxel_size";
-/// Maximum rounding of a position (voxels) for which its position is still written in 32 bits.
+/// Maximum spacing of 32-bit numbers (voxels) with which positions are still written in 32 bits.
 const MAX_ROUNDING: f64 = 1e-3;
 
 /// Whether a .ply file has vertices and no faces. A file that has neither holds a mesh if it declares zero faces, and points if it does not
@@ -127,7 +127,7 @@ pub fn write_without_voxels(path: &Path, points: &Points) -> Result<()> {
     atomic::write(path, |out| write_to(out, points, &attributes, false))
 }
 
-/// The bytes of such a file.
+/// The bytes of a file that [`write()`] would write.
 ///
 /// # Errors
 /// As [`write()`].

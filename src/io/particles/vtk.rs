@@ -64,7 +64,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<ParticleColumns, String> {
                 count = values.parse().map_err(|_| wrong())?;
                 let points = found.as_ref().map_or(0, ParticleColumns::count);
                 if owner == Owner::Points && count != points {
-                    return Err(format!("there are data of {count} points, but {points} points"));
+                    return Err(format!("there are data for {count} points, but {points} points"));
                 }
             }
             ("field", [_, arrays]) => {
@@ -277,7 +277,7 @@ impl<'a> Reader<'a> {
         Type::Number(if self.is_binary { Kind::U8 } else { Kind::F32 })
     }
 
-    /// Skips cells: two arrays with names and types since version 5, one before.
+    /// Skips cells: two arrays with names and types since version 5, a single array in earlier versions.
     fn skip_cells(&mut self, cells: usize, size: usize) -> Result<(), String> {
         let named = |name: &'static str| {
             move |words: &[&str]| words.len() == 2 && words[0] == name && type_of(words[1]).is_some()
@@ -372,7 +372,8 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Skips a text: a line or, in binary files, its bytes after a length whose two highest bits give the number of bytes that it occupies.
+    /// Skips a text: a line or, in binary files, its bytes after a length, whose two highest bits tell how many bytes the length itself
+    /// occupies.
     fn skip_text(&mut self) -> Result<(), String> {
         let first = *self.rest().first().ok_or_else(truncated)?;
         if !self.is_binary {

@@ -30,7 +30,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<ParticleColumns, String> {
             Some(_) if piece.count == 0 => {}
             Some(all) if all.count > 0 => {
                 all.append(piece)
-                    .ok_or_else(|| format!("piece {} has other data than those before", n + 1))?;
+                    .ok_or_else(|| format!("piece {} has other data than the pieces before it", n + 1))?;
             }
             _ => all = Some(piece),
         }

@@ -65,7 +65,7 @@ impl<'a> File<'a> {
     /// The appended data from an offset onward.
     pub fn appended(&self, offset: usize) -> Result<Stream<'a>, String> {
         let (is_base64, data) = self.appended.ok_or("is appended, and the file has no appended data")?;
-        let data = data.get(offset..).ok_or("begins behind the end of the file")?;
+        let data = data.get(offset..).ok_or("begins beyond the end of the file")?;
         Ok(if is_base64 { Stream::base64(data) } else { Stream::raw(data) })
     }
 

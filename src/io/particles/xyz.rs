@@ -70,7 +70,7 @@ fn parse_text(bytes: &[u8]) -> Result<ParticleColumns, String> {
             }
         };
         for _ in 0..3 {
-            let word = words.next().ok_or_else(|| format!("line {n}: there are no three numbers"))?;
+            let word = words.next().ok_or_else(|| format!("line {n}: there are not three numbers"))?;
             numbers
                 .push(text::number(word).ok_or_else(|| format!("line {n}: {}", text::not_a_number(word)))?);
         }
@@ -111,7 +111,7 @@ impl Commas {
         let first = words.get(..3).filter(|first| inner(first[0]) <= 1).unwrap_or_default();
         let has_point = |word: &&[u8]| word.contains(&b'.');
         if first.iter().any(|word| inner(word) > 0) {
-            // Such as 1,234.5, whose comma is neither.
+            // Such as 1,234.5, whose comma is neither a decimal comma nor between numbers.
             let is_odd = |word: &&&[u8]| inner(word) > 0 && !text::has_decimal_comma(word);
             if let Some(word) = first.iter().find(is_odd) {
                 return Err(unclear(word));

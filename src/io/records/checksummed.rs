@@ -39,7 +39,7 @@ pub const UNSTAMPED: &str = "00000000000000000000000000000000";
 /// The text before a stamp.
 const BEFORE_STAMP: &str = "\"check\": \"";
 
-/// Replaces [`UNSTAMPED`], the value of the key \"check\", by the hash of the text.
+/// Replaces [`UNSTAMPED`], the value of the key `check`, by the hash of the text.
 pub fn stamp(text: &str) -> String {
     let hash = hash::of_bytes(text.as_bytes());
     text.replacen(&format!("{BEFORE_STAMP}{UNSTAMPED}"), &format!("{BEFORE_STAMP}{hash}"), 1)
@@ -66,7 +66,7 @@ pub fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
     let damaged = || {
         Error::file(
             path,
-            "the record is damaged, cut short or changed by hand: remove it to make what it stands for again",
+            "the record is damaged, cut short or changed by hand: remove it, and what it records is made again",
         )
     };
     let file: Value = serde_json::from_slice(&bytes).map_err(|_| damaged())?;

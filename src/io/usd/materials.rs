@@ -7,7 +7,8 @@ use std::fmt::Write;
 pub enum Look {
     /// Snow with a surface: meshes, level sets, grains. A `UsdPreviewSurface`.
     Snow,
-    /// Snow as a density. USD has no volume shader that all renderers support: the material holds the parameters that theirs need.
+    /// Snow as a density. USD has no volume shader that all renderers support: the material holds the parameters that the renderers' own
+    /// shaders need.
     Fog,
     /// Objects that move through the snow. A `UsdPreviewSurface`.
     Object,
@@ -48,7 +49,7 @@ impl Look {
         let _ = writeln!(out, "{indent}rel material:binding = </shot/{SCOPE}/{}>", self.name());
     }
 
-    /// Whether its opacity is that of its mesh.
+    /// Whether its opacity is that of the mesh.
     fn is_liquid(self) -> bool {
         matches!(self, Self::Water | Self::Blood | Self::Paint | Self::Honey)
     }

@@ -22,7 +22,7 @@ pub struct MeshFrame<'a> {
     pub name: &'a str,
     /// Positions (m).
     pub points: &'a [Vec3],
-    /// Velocities (m/s) over the coming frame, one per point; none for a mesh that is another one at each frame.
+    /// Velocities (m/s) over the coming frame, one per point; none for a mesh that is a new one at each frame.
     pub velocities: &'a [Vec3],
     /// Triangles.
     pub triangles: &'a [[u32; 3]],
@@ -46,7 +46,7 @@ pub struct MeshPrim<'a> {
     pub name: String,
     /// Its material.
     pub look: Look,
-    /// Whether its frames have velocities; a mesh that is another one at each frame has none.
+    /// Whether its frames have velocities; a mesh that is a new one at each frame has none.
     pub moves: bool,
     /// The texture coordinates of its frames, if any.
     pub uvs: Option<&'a Uvs>,
@@ -97,7 +97,7 @@ impl Field {
     }
 }
 
-/// Frames and units of a stage.
+/// Frames of a stage, and their rate.
 #[derive(Debug, Clone, Copy)]
 pub struct StageTime {
     /// First frame.

@@ -203,7 +203,7 @@ const EXPONENT_FROM: f64 = 1e16;
 /// Writes a number in USD's syntax.
 pub(in crate::io) fn number(out: &mut String, number: Number, value: f64) {
     let _ = match number {
-        // USD accepts it only in lower case, and takes long numbers without an exponent for integers.
+        // USD accepts NaN only in lower case, and takes long numbers without an exponent for integers.
         _ if value.is_nan() => write!(out, "nan"),
         Number::F32 if value.abs() >= EXPONENT_FROM => write!(out, "{:e}", value as f32),
         Number::F64 if value.abs() >= EXPONENT_FROM => write!(out, "{value:e}"),

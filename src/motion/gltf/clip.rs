@@ -59,7 +59,10 @@ impl Clip {
             let rows = times.len() * if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
             let width = values.len() / rows;
             if width == 0 || width * rows != values.len() {
-                return Err(format!("node \"{}\" has not one value a key", node.name().unwrap_or("?")));
+                return Err(format!(
+                    "node \"{}\" does not have one value per key",
+                    node.name().unwrap_or("?")
+                ));
             }
             channels.push(Channel { node: node.index(), property, interpolation, times, values, width });
         }

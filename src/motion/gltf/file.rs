@@ -148,7 +148,7 @@ impl File {
     fn values<const N: usize>(&self, accessor: &Accessor) -> std::result::Result<Vec<[f64; N]>, String> {
         let name = format!("accessor {}", accessor.index());
         if components(accessor.dimensions()) != N {
-            return Err(format!("{name} has not {N} components"));
+            return Err(format!("{name} does not have {N} components"));
         }
         let beyond = || format!("{name} reaches beyond its buffer");
         let view = accessor.view().filter(|_| !self.zeros.contains(&accessor.index()));

@@ -86,7 +86,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, String> {
 fn chunks(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
     let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     if word(4) != Some(2) {
-        return Err("it is of another version than 2".into());
+        return Err("its version is not 2".into());
     }
     let end = (word(8).unwrap_or(0) as usize).min(bytes.len());
     let (mut at, mut json, mut binary) = (12, None, None);
@@ -101,7 +101,7 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
         }
         at += 8 + length;
     }
-    Ok((json.ok_or("its first chunk is no JSON")?, binary))
+    Ok((json.ok_or("its first chunk is not JSON")?, binary))
 }
 
 /// Refuses files that require an extension that is not read.

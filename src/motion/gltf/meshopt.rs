@@ -16,11 +16,11 @@ const MAX_EXPANSION: usize = 256;
 /// What is wrong with the data, as part of a sentence about the view.
 pub(super) fn decode(view: &Compressed, data: &[u8]) -> Result<Vec<u8>, String> {
     let size = view.stride.checked_mul(view.count).filter(|size| *size / MAX_EXPANSION <= data.len());
-    let size = size.ok_or("is shorter than its count")?;
+    let size = size.ok_or("is shorter than its count requires")?;
     let mut bytes = match view.mode.as_str() {
         "ATTRIBUTES" => vertices(view, data)?,
         "TRIANGLES" if !view.count.is_multiple_of(3) => {
-            return Err("has indices that are no triangles".into());
+            return Err("has indices that do not form triangles".into());
         }
         "TRIANGLES" => {
             let mut indices = vec![0u32; view.count];

@@ -347,7 +347,7 @@ impl FileVertices {
         };
         let coordinates = file.rows::<2>(&accessor)?;
         if coordinates.len() != count {
-            return Err("has not texture coordinates for every vertex".into());
+            return Err("does not have texture coordinates for every vertex".into());
         }
         let before = || Uvs { coordinates: vec![[0.0; 2]; begin], corners: None, missing: begin };
         let uvs = self.uvs.get_or_insert_with(before);
@@ -373,7 +373,7 @@ fn joints(
         let (Some(joints), Some(weights)) = accessors else { break };
         let (joints, weights) = (file.indices::<4>(&joints)?, file.rows::<4>(&weights)?);
         if joints.len() != count || weights.len() != count {
-            return Err("has not joints and weights for every vertex".into());
+            return Err("does not have joints and weights for every vertex".into());
         }
         for (vertex, (joints, weights)) in out.iter_mut().zip(joints.iter().zip(&weights)) {
             vertex.extend(joints.iter().copied().zip(weights.iter().copied()).filter(|(_, w)| *w > 0.0));
