@@ -1,27 +1,29 @@
 //! A detailed triangle mesh that follows a particle liquid and keeps its detail where the liquid neither breaks nor stretches (thesis
 //! chapter 2).
 //!
-//! In each frame the particles carry the mesh along (`track/advect.rs`), then each vertex is moved to its distance from the particles'
-//! surface at the first frame (`track/project.rs`). That surface is the zero set of an implicit function of the particles
+//! In each frame the particles carry the mesh along (`track/advect.rs`), then each vertex is moved to the distance from the particles'
+//! surface that it had at the first frame (`track/project.rs`). That surface is the zero set of an implicit function of the particles
 //! (`level_set/implicit.rs`), converted to signed distances (`level_set/band.rs`). Where this would move vertices too far, the liquid has
-//! merged or split: they are flagged, and so are those beside which the mesh does not cover the surface (`topology/coverage.rs`).
+//! merged or split: these vertices are flagged, and so are those beside a part of the surface that the mesh does not cover
+//! (`topology/coverage.rs`).
 //!
-//! There the mesh is changed (`topology/update.rs`, `topology/change.rs`): its own signed distances take the topology of phi
-//! (`topology/mesh_distance.rs`, `topology/matching/`), and it is cut and rebuilt in the cells where it no longer fits (`mesh_repair`).
-//! Parts without liquid are removed (`topology/dry_parts.rs`), stretched edges are split and compressed ones collapsed (`remesh/`).
+//! There the mesh is changed (`topology/update.rs`, `topology/change.rs`): the signed distances from it take the topology of phi, the
+//! function above (`topology/mesh_distance.rs`, `topology/matching/`), and it is cut and rebuilt in the cells where it no longer fits
+//! (`mesh_repair`). Parts without liquid are removed (`topology/dry_parts.rs`), stretched edges are split and compressed ones collapsed
+//! (`remesh/`).
 //!
 //! # Glossary
 //!
 //! | word | meaning |
 //! |---|---|
 //! | spacing, r | initial distance between particles |
-//! | cell, node | the grid's spacing, half of r; a corner of the grid, where phi is known |
+//! | cell, node | a cube of the grid, also the length of its edge, r / 2 by default; a corner of such a cube, where phi is known |
 //! | phi | the implicit function of the particles; then the signed distance from its zero set, negative inside |
 //! | delta | the distance from phi = 0 that a vertex keeps: its detail, with the sign of phi |
 //! | fading | delta shrinks: detail of a runny liquid is not retained |
 //! | patch | 4 x 4 x 4 nodes, which are evaluated together |
 //! | foot | the projection of a vertex onto phi = 0: the vertex without its detail |
-//! | covered | of a position on phi = 0: a triangle of feet is near it |
+//! | covered | of a position on phi = 0: a triangle whose corners are feet is near it |
 //! | Gamma, psi | the signed distance from the mesh; Gamma - phi |
 //! | change | how a step changed the mesh's vertices and triangles, where it was rebuilt or improved |
 //! | flagged | of a vertex: its projection failed or jumped (it stays where advection put it), or there is uncovered surface beside its foot |

@@ -13,24 +13,25 @@ pub struct Params {
     pub change: f64,
     /// How particles carry vertices.
     pub weighting: Weighting,
-    /// Time (s) in which half of the detail fades, over 0; infinite: detail does not fade with time (thesis 2.8 wishes for it).
+    /// Time (s) in which half of the detail fades, over 0; infinite: detail does not fade with time (suggested in thesis 2.8).
     pub half_life: f64,
-    /// How much detail fades where the mesh is strained: to exp(-fade) of it when lengths change by a factor of e; 0..=1000.
+    /// How much detail fades where the mesh is strained: it shrinks to exp(-fade) times its size when lengths change by a factor of e;
+    /// 0..=1000.
     pub fade: f64,
     /// Whether the mesh is rebuilt where the liquid merges or splits (thesis 2.4, 2.5); it must then be a closed 2-manifold by index. If
-    /// not, vertices are only flagged there.
+    /// false, vertices are only flagged there.
     pub rebuild: bool,
-    /// If it is rebuilt: whether its topology is matched to that of the particles everywhere and in every step (thesis 2.8), including
-    /// bubbles; if not, only where vertices are flagged, and at drops.
+    /// If the mesh is rebuilt: whether its topology is matched to that of the particles everywhere and in every step (thesis 2.8),
+    /// including bubbles; if false, only where vertices are flagged, and at drops.
     pub every: bool,
-    /// If it is rebuilt: minimum count of particles in a part of the mesh, 0..=1,000,000. Parts with fewer are removed, and drops with
-    /// fewer get no mesh; with 0 and 1 only parts without any particle inside are removed. If at least one lies inside, those outside
-    /// within half a spacing of the part count too. A mesh of one part stays.
+    /// If the mesh is rebuilt: minimum count of particles in a part of the mesh, 0..=1,000,000. Parts with fewer are removed, and drops
+    /// with fewer get no mesh; with 0 and 1 only parts without any particle inside are removed. If at least one particle lies inside a
+    /// part, those outside within half a spacing of it count too. A mesh of one part stays.
     pub min_drop: usize,
 }
 
 impl Params {
-    /// The thesis' values for particles of a spacing (m), except for the weighting.
+    /// The thesis' values, for particles with this spacing (m), except that the weighting is affine and the mesh is not rebuilt.
     pub fn for_spacing(spacing: f64) -> Self {
         let (half_life, fade) = (f64::INFINITY, 0.0);
         let weighting = Weighting::Affine;

@@ -44,13 +44,14 @@ impl StepReport {
         self.mesh_warnings.iter().chain(&self.particle_warning)
     }
 
-    /// Warnings to log: all about the mesh, and one about the particles unless `has_warned` is set, which it then is.
+    /// Warnings to log: all about the mesh, and the one about the particles, if there is one, unless `has_warned` is already set; it is set
+    /// by that warning.
     pub fn new_warnings(&self, has_warned: &mut bool) -> impl Iterator<Item = &String> {
         let of_particles = self.particle_warning.as_ref().filter(|_| !std::mem::replace(has_warned, true));
         self.mesh_warnings.iter().chain(of_particles)
     }
 
-    /// The combined report of two successive steps; flags are those after the second.
+    /// The combined report of two successive steps; flagged vertices are those of the second.
     pub fn followed_by(mut self, next: Self) -> Self {
         for phase in next.phases {
             match self.phases.iter_mut().find(|own| own.name == phase.name) {

@@ -57,7 +57,7 @@ impl Tracker {
     /// Resumes from a state that [`Tracker::save`] wrote; `mesh` is the initial mesh.
     ///
     /// # Errors
-    /// Parameters out of range; bytes that are not a valid state, or the state of other cells or of another mesh.
+    /// Parameters out of range; bytes that are not a valid state, or the state for another spacing, cell or mesh.
     pub fn resume(params: Params, mesh: &TriMesh, bytes: &[u8]) -> Result<Self> {
         params.validate()?;
         mesh.validate()?;
@@ -86,11 +86,11 @@ impl Tracker {
         let (triangles, detail_retention, own) = made;
         let count = from.count(3 * 8 + 4 + 1)?;
         fail_if(!is_rebuilt && count != mesh.positions.len(), || {
-            wrong(&format!("is of a mesh of {count} vertices, not {}", mesh.positions.len()))
+            wrong(&format!("belongs to a mesh of {count} vertices, not {}", mesh.positions.len()))
         })?;
-        fail_if(is_other, || wrong("is of a mesh of other triangles"))?;
+        fail_if(is_other, || wrong("belongs to a mesh with other triangles"))?;
         let is_wild = triangles.as_flattened().iter().any(|corner| *corner as usize >= count);
-        fail_if(is_wild, || wrong("has a triangle without a vertex"))?;
+        fail_if(is_wild, || wrong("has a triangle with a vertex that does not exist"))?;
         let is_share = |share: &f32| (0.0..=1.0).contains(share);
         let fits = [0, count].contains(&detail_retention.len()) && detail_retention.iter().all(is_share);
         fail_if(!fits, || wrong("has shares of detail that do not fit"))?;

@@ -4,7 +4,7 @@ use super::{Implicit, Isosurface, Params, Particles, Tracker};
 use crate::context::{Context, Pool};
 use crate::geometry::{DVec3, TriMesh};
 
-/// A context of this many threads; 0: everything runs on the caller's.
+/// A context of this many threads; 0: everything runs on the caller's thread.
 pub fn context(threads: usize) -> Context {
     Context::new(Pool::new(threads).unwrap())
 }

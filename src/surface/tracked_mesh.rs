@@ -10,7 +10,7 @@ use crate::geometry::{DVec3, TriMesh};
 /// Minimum reach of the band, and the maximum that is tried at the first frame (r).
 pub(in crate::surface) const REACH: [f64; 2] = [1.5, 8.0];
 
-/// Factor by which the band reaches farther than the vertices did before (thesis 2.3.1).
+/// Factor on the vertices' deltas in the reach of the band (thesis 2.3.1).
 pub(in crate::surface) const WIDER: f64 = 1.25;
 
 /// Maximum drift of a vertex in a frame, where nothing merges or splits (r).
@@ -25,11 +25,12 @@ pub struct Tracker {
     pub(super) triangles: Vec<[u32; 3]>,
     /// Distance from the surface that each vertex keeps (m); NaN: it was too far from the surface to have one.
     pub(super) delta: Vec<f32>,
-    /// Detail retention: share 0..=1 of each vertex' detail that never fades; empty: none.
+    /// Detail retention of each vertex, 0 (fades as fast as the parameters say) to 1 (never fades); empty: 0 everywhere.
     pub(super) detail_retention: Vec<f32>,
     /// Vertices where the last step found a change.
     pub(super) flags: Vec<bool>,
-    /// Vertices with surface beside them that the mesh did not cover at the first frame, nor since: this is not reported as a change.
+    /// Whether each vertex lay beside surface that the mesh did not cover at the first frame: there, uncovered surface is never reported as
+    /// a change.
     pub(super) never_covered: Vec<bool>,
     /// Distance from the surface up to which distances are known (r).
     pub(super) reach: f64,
@@ -73,7 +74,7 @@ impl Tracker {
         for (name, old, new) in
             [("spacing", self.params.spacing, params.spacing), ("cell", self.params.cell, params.cell)]
         {
-            fail_if(old != new, || Error::argument(format!("{name} = {new} cannot change, it is {old}")))?;
+            fail_if(old != new, || Error::argument(format!("{name} cannot change from {old} to {new}")))?;
         }
         if self.params.rebuild != params.rebuild {
             return Err(Error::argument("whether the mesh is rebuilt cannot change"));

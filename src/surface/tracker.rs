@@ -34,7 +34,7 @@ use crate::geometry::{DVec3, TriMesh};
 /// Reaches of the band (r) that are tried one after the other at the first frame, around vertices that have not found the surface.
 const TRIES: [f64; 2] = [5.0, REACH[1]];
 
-/// The reach covers the distance of this fraction of the vertices, so that a spike does not widen the band everywhere.
+/// The band's reach covers the deltas of this fraction of the vertices, so that a spike does not widen the band everywhere.
 const REACHED: f64 = 0.999;
 /// If `REACHED` would need a reach above `WIDE` (r), the reach covers only the fraction `REACHED_IF_WIDE`, but is at least `WIDE`; around
 /// the remaining vertices the band is widened locally.
@@ -42,7 +42,7 @@ const WIDE: f64 = 2.5;
 const REACHED_IF_WIDE: f64 = 0.95;
 /// Minimum displacement of a vertex by projection (r): anything less is rounding.
 const STILL: f64 = 1e-5;
-/// Minimum fraction of vertices near the particles' surface at the first frame.
+/// Minimum fraction of the vertices that must lie near the particles' surface at the first frame.
 const OVERLAP: f64 = 0.5;
 
 impl Tracker {
@@ -117,7 +117,7 @@ impl Tracker {
             return Ok(());
         }
         Err(Error::argument(format!(
-            "only {:.0} % of the mesh lies within {} spacings of {} m of the particles' surface: are both in the same space and unit?",
+            "only {:.0} % of the mesh lies within {} spacings (of {} m) of the particles' surface: are both in the same space and unit?",
             100.0 * share,
             REACH[1],
             self.params.spacing
@@ -130,8 +130,8 @@ impl Tracker {
     /// reappear; one that is not rebuilt stays where it was, with all of its vertices lost.
     ///
     /// # Errors
-    /// A time that is not positive; particles that are not valid, or have neither ids nor velocities; where the mesh is rebuilt, vertices
-    /// too far apart for the grid, or more memory than the context allows; cancel.
+    /// A time that is not positive; particles that are not valid, or have neither ids nor velocities; if the mesh is rebuilt, vertices too
+    /// far apart for the grid, or more memory than the context allows; cancel.
     pub fn step(&mut self, ctx: &Context, from: &Particles, to: &Particles, dt: f64) -> Result<StepReport> {
         validate_step(from, to, dt)?;
         if to.positions.is_empty() {
@@ -220,7 +220,7 @@ impl Tracker {
         }
     }
 
-    /// Replaces the mesh by that after a step; returns the report.
+    /// Replaces the mesh by the one after a step; returns the report.
     fn adopt(&mut self, next: Next) -> StepReport {
         (self.vertices, self.delta, self.flags) = (next.vertices, next.delta, next.flags);
         self.drift.vertices = next.drifts;
@@ -234,13 +234,13 @@ impl Tracker {
         next.report
     }
 
-    /// Prefetches the particles of the step after next: while the mesh is rebuilt, their surface is computed on idle threads. The result is
-    /// identical.
+    /// Prefetches the particles of the step after next: while the mesh is rebuilt, their surface is computed on idle threads. The results
+    /// of steps are the same without it.
     pub fn prefetch(&mut self, particles: Arc<Particles>) {
         self.prefetch.wanted = Some(particles);
     }
 
-    /// Drops the prefetched surface, which a clone of the tracker uses.
+    /// Drops the prefetched surface: for a tracker whose clone makes the next step instead.
     pub fn forget_prefetched(&mut self) {
         self.prefetch = Prefetch::default();
     }
@@ -343,7 +343,7 @@ impl Tracker {
         vertices.map_init(|| Sampler::new(distances), one).unzip()
     }
 
-    /// Moves vertices (m) to their kept distance, unless that is too far.
+    /// Moves vertices (m) to their kept distance, unless that would move them too far.
     fn projected(
         &self,
         ctx: &Context,
@@ -396,9 +396,9 @@ pub(super) struct Next {
 pub(super) struct Coverage {
     /// Connected parts on which no vertex has its foot.
     pub uncovered_parts: Vec<UncoveredPart>,
-    /// Whether each vertex is beside an uncovered position of another part.
+    /// Whether each vertex is beside an uncovered position of one of the other parts.
     pub uncovered: Vec<bool>,
-    /// These positions (cells).
+    /// The uncovered positions of the other parts (cells).
     pub positions: Vec<DVec3>,
     /// Distance between a foot and an uncovered position up to which the vertex is beside it (cells).
     pub reach: f64,
@@ -409,7 +409,7 @@ pub(super) struct Coverage {
 /// Result of projecting a vertex.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Projection {
-    /// It keeps its distance from its foot (cells).
+    /// It was put at its distance from this foot (cells).
     Placed(DVec3),
     /// It would have been moved too far.
     Jumped,

@@ -22,7 +22,7 @@ pub struct Distances {
     cell: f64,
     /// How far from the surface distances are known (cells); beyond, they are clamped to this.
     reach: f32,
-    /// Blocks in which they are known farther.
+    /// Blocks in which distances are known farther from the surface, ascending, each with how far (cells).
     deep: Vec<(Coord, f32)>,
     /// Coordinates of blocks, ascending.
     coords: Vec<Coord>,

@@ -161,7 +161,7 @@ impl Around<'_> {
         f64::from(SIDE) * self.cell
     }
 
-    /// The minimum and maximum cell, of an edge `unit` (m), within a margin (m) of a patch's nodes.
+    /// The minimum and maximum coordinates of the cells, with edges of `unit` (m), within a margin (m) of a patch's nodes.
     fn extent(&self, patch: Coord, margin: f64, unit: f64) -> [Coord; 2] {
         let low = patch.map(|at| f64::from(at) * self.edge());
         let high = low.map(|at| at + self.edge() - self.cell + margin);
@@ -172,7 +172,7 @@ impl Around<'_> {
         ]
     }
 
-    /// Patches within a spacing of particles that must be evaluated, and those that are full, both ascending.
+    /// The patches within a spacing of particles: those that must be evaluated, and those that are full, both ascending.
     fn patches(&self) -> (Vec<Coord>, Vec<Coord>) {
         let edge = self.cells.edge();
         let mut near: Vec<Coord> = self

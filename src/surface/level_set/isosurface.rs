@@ -9,8 +9,9 @@ use crate::geometry::{Coord, DVec3, TriMesh};
 
 /// Sentinel: no vertex.
 const NONE: u8 = u8::MAX;
-/// Ratios of the second differences to the first one along a line. Up to the smaller ratio the values count as smooth, and a cubic
-/// interpolates them; from the larger one on as a kink, and a line does. In between both are blended, so that the surface does not flicker.
+/// Ratios of the second differences to the first difference along a line. Up to the smaller ratio the values count as smooth, and a cubic
+/// interpolates them; from the larger one on they count as a kink, and a straight line does. In between the two results are blended, so
+/// that the surface does not flicker.
 const SMOOTH: [f32; 2] = [0.3, 0.5];
 /// Iterations to the zero of a cubic; each leaves less than half of the error.
 const STEPS: usize = 6;
@@ -18,7 +19,7 @@ const STEPS: usize = 6;
 /// The surface's triangles.
 #[derive(Debug, Default)]
 pub struct Isosurface {
-    /// For each evaluated patch, its first vertex; then the count of all.
+    /// For each evaluated patch, the index of its first vertex; then the count of all vertices.
     first: Vec<u32>,
     /// Positions of vertices, in cells from the first node of their patch.
     positions: Vec<[f32; 3]>,

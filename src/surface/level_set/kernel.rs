@@ -10,7 +10,8 @@ use super::thickness::Spread;
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::{LANES, Lanes};
 
-/// Maximum rate at which the mean may move with the position, and the rate from which on nothing is inside (Solenthaler et al., 2007).
+/// Rates at which the mean moves with the position: up to the first f is 1, from the second on f is 0 and nothing is inside (Solenthaler et
+/// al., 2007).
 const RATES: [f64; 2] = [0.4, 3.5];
 
 /// Particles around some nodes, in cells from a common corner.
@@ -101,7 +102,7 @@ fn spread(sums: &Sums, lane: usize, radius: f64) -> Spread {
     for (sum, [a, b]) in sums.square.iter().zip(PAIRS) {
         (square[(a, b)], square[(b, a)]) = (of(sum), of(sum));
     }
-    // q^3 is q^2 less q^2 d^2 / R^2.
+    // q^3 is q^2 minus q^2 d^2 / R^2.
     let weight = of(&sums.weight) + square.trace() / (radius * radius);
     let mean = Vector3::from(sums.slope.each_ref().map(of)) / weight;
     Spread { weight, covariance: square / weight - mean * mean.transpose() }

@@ -62,7 +62,7 @@ pub fn spheres(ctx: &Context, positions: &[DVec3], radius: f64, cell: f64) -> Re
     let cells = radius / cell;
     if !is_sphere_radius(radius, cell) {
         return Err(Error::argument(format!(
-            "spheres of {radius} m have a radius of {cells:.3} cells of {cell} m: it must be 1.5 to 100"
+            "the radius of the spheres, {radius} m, is {cells:.3} cells of {cell} m: it must be 1.5 to 100 cells"
         )));
     }
     let is_near = |position: &DVec3| position.iter().all(|x| x.abs() + radius < FARTHEST * cell);
@@ -79,8 +79,8 @@ pub fn spheres(ctx: &Context, positions: &[DVec3], radius: f64, cell: f64) -> Re
     Ok(grid)
 }
 
-/// Upper bound on the count of blocks within `reach` (cells) of positions (m): the blocks in cubes at least that long that contain
-/// positions, and in the cubes around these.
+/// Upper bound on the count of blocks within `reach` (cells) of positions (m): the blocks in the cubes, with edges of at least `reach`,
+/// that contain positions, and in the cubes around these.
 fn max_blocks(positions: &[DVec3], reach: f64, cell: f64) -> u64 {
     let blocks = (reach / DIM as f64).ceil();
     let edge = blocks * DIM as f64 * cell;

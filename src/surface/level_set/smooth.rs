@@ -26,8 +26,8 @@ const MAX_REACH: f64 = 1.1;
 /// Vertices of a task.
 const PIECE: usize = 1024;
 
-/// Smooths a closed mesh in `passes` passes; each of its connected parts keeps its volume. A part that a pass would take farther from its
-/// centre than 1.1 times its initial reach stays as it was before that pass: it is as smooth as possible. Triangles do not change.
+/// Smooths a closed mesh in `passes` passes; each of its connected parts keeps its volume. A part that would reach farther from its centre
+/// after a pass than 1.1 times as far as at first stays as it was before that pass: it is as smooth as possible. Triangles do not change.
 ///
 /// # Errors
 /// Cancel.
@@ -221,7 +221,7 @@ mod tests {
         for (before, after) in before.into_iter().zip(after) {
             assert!((after / before - 1.0).abs() < 1e-3, "{after} is not {before}");
         }
-        // It no longer does: opposite corners are about as far from the middle.
+        // The corner no longer sticks out: opposite corners are about equally far from the middle.
         let far = |vertex: usize| {
             let middle = mesh.positions[6..].iter().sum::<Vec3>() / 6.0;
             (mesh.positions[vertex] - middle).norm()

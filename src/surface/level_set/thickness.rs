@@ -1,19 +1,19 @@
 //! How thick the liquid is around a node, so that sheets and threads thinner than the particle spacing keep their volume.
 //!
 //! Solenthaler et al. (2007) put the surface one spacing r from the particles' mean. That is right at the surface of a large body, where
-//! the mean lies r deep. The mean of a sheet lies in its middle, so that its surface would be r from there however thin the sheet is. Half
-//! of its thickness replaces r where it is less.
+//! the mean lies r deep. The mean of a sheet lies in its middle, so that its surface would be r from there however thin the sheet is. So
+//! half of the thickness replaces r where it is less than r.
 //!
 //! The thickness follows from the particles' mass, r^3 each, and from their spread: in a sheet of thickness w the sum of q^2
 //! (q = 1 - d^2 / R^2) is w pi R^2 Q^3 / 3 / r^3, Q being q at the sheet's middle, and the variance along the sheet is R^2 Q / 8. Where
-//! they spread less, at rims, in ribbons and threads, they fill less of the sheet, and it is thicker by the same factor.
+//! particles spread less, at rims, in ribbons and threads, they fill less of the sheet's area, and the sheet is thicker by the same factor.
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 use super::SUPPORT;
 
 /// Minimum distance of a surface from a sheet's middle (cells). Nodes inside a sheet must be neighbours along edges of the grid, or
-/// marching cubes break it up: whatever its orientation, its sides must be apart by the diagonal of a cell's face.
+/// marching cubes break it up: whatever its orientation, its sides must be at least the diagonal of a cell's face apart.
 const MIN_DISTANCE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Sums over the particles around a node, weighted by q^2; lengths are in cells.
@@ -26,12 +26,12 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// How far from the mean the surface lies, and how far the node is from the mean; `mean` is the displacement to it, `spacing` is r (all
-    /// in cells). In a sheet the component of the displacement across it counts in full, and the component along it less: the rim is where
-    /// the latter is r.
+    /// How far from the mean the surface lies, and how far the node is from the mean; `mean` is the displacement from the node to the mean,
+    /// `spacing` is r (all in cells). In a sheet the component of the displacement across it counts in full, and the component along it
+    /// less: the rim is where the latter is r.
     pub fn offset(&self, mean: Vector3<f64>, spacing: f64) -> (f64, f64) {
         let thick = (spacing, mean.norm());
-        // More than a cell from where a surface can be, or no sheet.
+        // The node is more than a cell from where a surface can be, or there is no sheet.
         if mean.norm() > spacing + 1.0 || self.is_thick(mean, spacing) {
             return thick;
         }
@@ -63,13 +63,14 @@ impl Spread {
     /// Whether the liquid is clearly thicker than twice the spacing.
     fn is_thick(&self, mean: Vector3<f64>, spacing: f64) -> bool {
         let trace = self.covariance.trace();
-        // The smallest variance is the determinant over the product of the others, which is at most (trace / 2)^2. NaN: a single particle.
+        // The smallest variance is the determinant over the product of the others, which is at most (trace / 2)^2. It is NaN for a single
+        // particle.
         let smallest = 4.0 * self.covariance.determinant() / (trace * trace);
         12.0 * smallest >= 4.0 * spacing * spacing
             || self.thickness(mean, spacing, 0.5 * trace, 0.5 * trace) >= 2.0 * spacing
     }
 
-    /// The thickness of a sheet along which the variances are these (cells).
+    /// The thickness of a sheet (cells) along which the variances are `a` and `b` (cells^2).
     fn thickness(&self, mean: Vector3<f64>, spacing: f64, a: f64, b: f64) -> f64 {
         let square = (SUPPORT * spacing).powi(2);
         let q = 1.0 - mean.norm_squared() / square;
@@ -106,7 +107,8 @@ mod tests {
         (Spread { weight: spread.weight, covariance: spread.covariance * 4.0 }, mean * 2.0)
     }
 
-    /// Half of the thickness found by a node `height` off the middle of a sheet of this many layers, over the true one.
+    /// Half of the thickness that a node at a distance `height` from the middle of a sheet of this many layers finds, divided by the true
+    /// value.
     fn found(thick: f64, layers: i32, height: f64) -> f64 {
         // Stretched until each particle has a volume of 1.
         let apart = (f64::from(layers) / thick).sqrt();

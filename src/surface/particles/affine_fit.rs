@@ -8,7 +8,7 @@ use crate::numeric::lanes::{LANES, Lanes};
 /// Fraction of the total variance of positions: in directions with less variance the map is constant.
 const FLAT: f64 = 0.004;
 
-/// Positions of particles from a common corner, and their displacements (spacings), padded to whole lanes.
+/// Positions of particles relative to a common corner, and their displacements (spacings), padded to whole lanes.
 #[derive(Default)]
 pub struct Near {
     position: [Vec<[f32; LANES]>; 3],

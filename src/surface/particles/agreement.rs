@@ -10,7 +10,7 @@ use crate::geometry::{Coord, DVec3};
 use crate::surface::Particles;
 use crate::surface::report::StepReport;
 
-/// Particles that are sampled.
+/// Maximum number of particles that are sampled.
 const SAMPLES: usize = 2000;
 /// If the median relative displacement of neighbouring particles in a frame is over this (spacings), ids do not identify them: in a
 /// splashing dam break it is 0.2.
@@ -19,16 +19,16 @@ const TOO_FAR_APART: f64 = 1.0;
 const BESIDE: f64 = 1.5;
 /// Velocities are wrong if over this fraction of particles finds no other particle where its velocity takes it.
 const MISSED: f64 = 0.5;
-/// If over the first fraction misses, factors on the velocities are tried; the best one is reported if it makes the fraction smaller by
-/// more than the second number, a factor.
+/// If more than the first fraction of the particles misses, factors on the velocities are tried; the best one is reported if it divides
+/// that fraction by more than the second number.
 const SOME_MISSED: [f64; 2] = [0.05, 4.0];
 /// Factors between units: feet, ten, inches, centimetres and millimetres. Of equally good factors the first is taken: very small velocities
-/// leave all particles within the liquid, and miss nothing.
+/// leave all particles within the liquid, where none misses.
 const FACTORS: [f64; 10] =
     [0.3048, 1.0 / 0.3048, 0.1, 10.0, 0.0254, 1.0 / 0.0254, 0.01, 100.0, 0.001, 1000.0];
 
-/// A sentence that describes how the particles, of a spacing (m), of two frames that are `dt` (s) apart contradict each other. None if they
-/// do not, or if a frame has no particles.
+/// A sentence that describes how the particles of two frames, which are `dt` (s) apart, contradict each other; their spacing is `spacing`
+/// (m). None if they do not, or if a frame has no particles.
 ///
 /// # Errors
 /// Neither ids in both frames nor velocities in the first.
@@ -45,8 +45,8 @@ pub fn disagreement(from: &Particles, to: &Particles, dt: f64, spacing: f64) -> 
     }
     Ok(median_separation(&paths, spacing).filter(|separation| *separation > TOO_FAR_APART).map(|separation| {
         format!(
-            "by their ids, particles beside each other go {separation:.2} spacings apart in a frame, in the median: are ids row numbers, \
-             which name other particles in each frame?"
+            "by their ids, neighbouring particles move apart by {separation:.2} spacings in a frame (median): are ids row numbers, which \
+             refer to other particles in each frame?"
         )
     }))
 }
@@ -137,15 +137,15 @@ fn velocities_miss(from: &Particles, to: &Particles, dt: f64, spacing: f64) -> O
     let percent = 100.0 * own;
     if best * SOME_MISSED[1] < own {
         return Some(format!(
-            "velocities take {percent:.0} % of the particles to where no others are a frame later; {:.0} % with velocities {factor:.4} \
-             times as large: is their unit another?",
+            "velocities take {percent:.0} % of the particles to where no others are a frame later; with velocities {factor:.4} times as \
+             large it would be {:.0} %: are they in another unit?",
             100.0 * best
         ));
     }
     (own > MISSED).then(|| {
         format!(
-            "velocities take {percent:.0} % of the particles to where no others are a frame later: is their unit, or the frame rate, \
-             another?"
+            "velocities take {percent:.0} % of the particles to where no others are a frame later: are they in another unit, or for \
+             another frame rate?"
         )
     })
 }

@@ -36,7 +36,7 @@ pub struct Cells {
 #[derive(Clone, Copy)]
 struct Item {
     key: u64,
-    /// Bits of the offset: as it is not negative, they order as the numbers do.
+    /// Bits of the offset: as it is not negative, they sort as the numbers do.
     offset: [u32; 3],
     index: u32,
 }
@@ -159,8 +159,8 @@ impl Cells {
         });
     }
 
-    /// Calls `see` with the coordinates (in halves of a cell's edge) of each octant of the cells from `low` to `high` that hold particles, and with its
-    /// count of particles.
+    /// Calls `see` with each octant of the cells from `low` to `high` that hold particles: its coordinates (in halves of a cell's edge) and
+    /// its count of particles.
     pub fn counts(&self, low: Coord, high: Coord, mut see: impl FnMut([i32; 3], u16)) {
         self.between(low, high, |cell, at| {
             for (octant, count) in self.octants[cell].iter().enumerate() {

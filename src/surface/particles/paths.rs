@@ -16,7 +16,7 @@ use crate::surface::Particles;
 pub struct Paths {
     from: Vec<DVec3>,
     to: Vec<DVec3>,
-    /// Velocities times the time between the frames (m), at both ends; none: paths are lines.
+    /// Velocities times the time between the frames (m), at both ends; empty: paths are lines.
     tangents: Vec<[DVec3; 2]>,
     /// Order of particles at the same position.
     ranks: Vec<i64>,
@@ -85,7 +85,7 @@ impl Paths {
     fn by_velocity(from: &Particles, dt: f64) -> Result<Self> {
         if from.velocities.is_empty() {
             return Err(Error::argument(
-                "particles have neither ids in both frames nor velocities: what moves where is not known",
+                "particles have neither ids in both frames nor velocities: their motion is unknown",
             ));
         }
         let displacements = from.velocities.iter().map(|velocity| DVec3::from(velocity.map(f64::from)) * dt);
@@ -99,7 +99,7 @@ impl Paths {
         Ok(Self { from: from.positions.clone(), to, ranks, ..Self::default() })
     }
 
-    /// The mismatch between velocities and positions, as with another unit or frame rate; none if velocities can be trusted.
+    /// The mismatch between velocities and positions, such as that of another unit or frame rate; none if velocities can be trusted.
     fn find_mismatch(&self) -> Option<VelocityMismatch> {
         let mean_tangent = |n: usize| (self.tangents[n][0] + self.tangents[n][1]) * 0.5;
         let displacement = |n: usize| self.to[n] - self.from[n];
@@ -131,7 +131,7 @@ impl Paths {
         self.ranks[path as usize]
     }
 
-    /// Maximum displacement of a particle, or length of a tangent (m).
+    /// Maximum displacement of a particle, or maximum length of a tangent if that is larger (m).
     pub fn max_displacement(&self) -> f64 {
         let each = (0..self.count()).into_par_iter().with_min_len(4096);
         each.map(|n| {
@@ -207,19 +207,19 @@ pub struct VelocityMismatch {
     pub by_ids: f64,
     /// Length of the displacements by velocities.
     pub by_velocities: f64,
-    /// Distance between their end points.
+    /// Distance between the end points of both.
     pub end_distance: f64,
-    /// Cosine of the angle between both.
+    /// Cosine of the angle between the two displacements.
     pub cosine: f64,
 }
 
 impl VelocityMismatch {
-    /// Displacements shorter than this (spacings) are jitter of particles at rest.
+    /// End points up to this far apart (spacings) raise no warning: jitter of particles at rest.
     const STILL: f64 = 0.5;
-    /// Minimum cosine at which both have the same direction.
+    /// Above this cosine both have the same direction: only the length of the velocities is wrong.
     const ALIGNED: f64 = 0.9;
 
-    /// A warning for particles of a spacing (m); none if both agree closely enough.
+    /// A warning for particles with this spacing (m); none if ids and velocities agree closely enough.
     pub fn sentence(&self, spacing: f64) -> Option<String> {
         if self.end_distance <= Self::STILL * spacing {
             return None;
@@ -227,15 +227,15 @@ impl VelocityMismatch {
         let [ids, velocities] = [self.by_ids, self.by_velocities].map(|length| length / spacing);
         let why = if self.cosine > Self::ALIGNED {
             format!(
-                "velocities are {:.3} times as large as they should be: is their unit, or the frame rate, another?",
+                "velocities are {:.3} times as large as they should be: are they in another unit, or for another frame rate?",
                 self.by_velocities / self.by_ids.max(f64::MIN_POSITIVE)
             )
         } else {
-            "are ids row numbers, which name other particles in each frame?".to_string()
+            "are ids row numbers, which refer to other particles in each frame?".to_string()
         };
         Some(format!(
-            "ids and velocities contradict each other: in the median particles go {ids:.2} spacings in a frame by their ids, and \
-             {velocities:.2} by their velocities; {why}"
+            "ids and velocities contradict each other: the median distance that particles travel in a frame is {ids:.2} spacings by \
+             their ids, and {velocities:.2} by their velocities; {why}"
         ))
     }
 }

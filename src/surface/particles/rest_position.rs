@@ -20,9 +20,9 @@ const DOUBLINGS: u32 = 1;
 /// Cells along a radius.
 const RINGS: i32 = 2;
 /// Particles have the same origin if their first positions lie within this many radii (4 spacings) of that of their representative. The
-/// particles around a position on the surface lie little more than a radius from the nearest one, so that liquid that has kept its shape
-/// has a single origin. Two bodies that were more than 4 spacings apart have two; if the gap was narrower, results between them are off by
-/// less than the gap. Where the liquid was compressed by more, only the nearest particles count.
+/// particles around a position on the surface lie at most slightly more than a radius from the nearest of them, so that liquid that has
+/// kept its shape has a single origin. Two bodies that were more than 4 spacings apart have two; if the gap was narrower, results between
+/// them are off by less than the gap. Where the liquid has been compressed by more than this factor, only the nearest particles count.
 const TOGETHER: f64 = 4.0 / 3.0;
 /// Positions per task.
 const PIECE: usize = 256;
@@ -55,8 +55,9 @@ impl Rest {
 
     /// Where the liquid at positions (m) was at the first frame (m), from the particles `now` around them, whose spacing is `spacing` (m).
     /// Their displacements back to the first frame are fitted by an affine map, like those of advection; of particles with different
-    /// origins only those of the origin with the largest total weight count. None if no particle that existed at the first frame is within
-    /// three spacings (six, if no other one is either), or particles have no ids. The results for different positions are independent.
+    /// origins only those of the origin with the largest total weight count. None if no particle within three spacings existed at the first
+    /// frame (within six, if there is none at all within three), or if particles have no ids. The results for different positions are
+    /// independent.
     ///
     /// # Errors
     /// A spacing that is not over 0; particles too far apart; cancel.
@@ -181,8 +182,8 @@ impl Field {
         self.fitted(position, from, RADIUS << doubling, scratch)
     }
 
-    /// Collects the particles within this many cells of a position, relative to the corner of its cell (cells), that existed at the first
-    /// frame. Returns whether any particle is near, even one that did not.
+    /// Collects the particles that existed at the first frame within `rings` cells of a position, which is relative to the corner of its
+    /// cell (cells). Returns whether any particle is near, even one that did not exist then.
     fn gather(&self, cell: Coord, from: DVec3, rings: i32, neighbours: &mut Vec<Neighbour>) -> bool {
         neighbours.clear();
         let (mut is_any, square) = (false, f64::from(rings * rings));
@@ -206,8 +207,8 @@ impl Field {
         is_any
     }
 
-    /// The position at the first frame (m), fitted to the particles gathered within a radius (spacings), of a position (m), which lies at
-    /// `from` relative to the corner of its cell (cells).
+    /// Where the liquid at a position (m) was at the first frame (m), fitted to the particles gathered within a radius (spacings); `from`
+    /// is the position relative to the corner of its cell (cells).
     fn fitted(&self, position: DVec3, from: DVec3, radius: i32, scratch: &mut Scratch) -> Option<DVec3> {
         let Scratch { neighbours, near, in_radius } = scratch;
         let max_distance = TOGETHER * f64::from(radius) * self.spacing;
@@ -228,7 +229,7 @@ impl Field {
         let to = |residual: DVec3| position + displacement + residual * self.spacing;
         let Some(sums) = sums(near, in_radius, at, radius as f32) else { return Some(to(DVec3::zeros())) };
         let fit = to(sums.map().at(DVec3::zeros()));
-        // If so few particles extrapolate far away, their mean is no worse.
+        // A fit to few particles may extrapolate far away; their mean is no worse then.
         Some(if (fit - first).norm() <= max_distance { fit } else { to(sums.mean()) })
     }
 }

@@ -6,8 +6,8 @@ use crate::geometry::DVec3;
 
 /// Count of particles whose neighbours are searched: for an estimate, and for a rough one.
 const SAMPLES: [usize; 2] = [256, 32];
-/// In a cubic grid this many particles are one spacing away. In a liquid they are nearer and farther, at the same mean distance (1.02
-/// spacings in frames of two solvers' caches).
+/// In a cubic grid this many particles are one spacing away. In a liquid some are nearer and some farther, but their mean distance is about
+/// the same (1.02 spacings in frames of two solvers' caches).
 const NEIGHBOURS: usize = 6;
 
 /// The spacing (m) of particles at positions (m): the median of the mean distance to the six nearest ones. None for fewer than seven
@@ -16,7 +16,7 @@ pub fn estimate(positions: &[DVec3]) -> Option<f64> {
     median(positions, SAMPLES[0])
 }
 
-/// The same within a tenth or so, in an eighth of the time: to check whether a given spacing is plausible.
+/// As [`estimate`], to within a tenth or so, in an eighth of the time: to check whether a given spacing is plausible.
 pub fn rough(positions: &[DVec3]) -> Option<f64> {
     median(positions, SAMPLES[1])
 }

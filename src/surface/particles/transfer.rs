@@ -1,4 +1,4 @@
-//! Particle attributes at the vertices of a surface: weighted means over the particles around.
+//! Particle attributes at the vertices of a surface: weighted means over the particles around each.
 
 use rayon::prelude::*;
 
