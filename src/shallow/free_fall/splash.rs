@@ -116,7 +116,7 @@ mod tests {
             assert!(landed.iter().all(|landing| columns.cell(landing.column as usize)[0] < 10) == (x < 10));
             landed.len()
         };
-        // Balls of 0.2 mm, 0.5 mm, and many cells, in the open and beside the edge.
+        // Balls with radii of 0.2 mm, 0.5 mm and many cells, in the open and beside the edge.
         assert_eq!([3.4e-11, 5.3e-10, 1e-6].map(|volume| spread_at(5, volume)), [1, 5, 29]);
         assert_eq!([5.3e-10, 1e-6].map(|volume| spread_at(9, volume)), [4, 18]);
         // Without capacity for all parts it lands in one.

@@ -11,7 +11,7 @@ pub(in crate::shallow) const WAITING_BYTES: usize = 40;
 /// Intervals after which liquid of less than a drop is released anyway.
 const PATIENCE: u32 = 60;
 
-/// An overflow edge drips if a drop takes longer than this many intervals; otherwise it pours, in a packet each interval.
+/// An overflow edge drips if a drop takes longer than this many intervals; otherwise it pours, one packet in each interval.
 const DRIPS: i64 = 8;
 
 /// Liquid that went over a link and is not a packet yet.

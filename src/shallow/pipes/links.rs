@@ -9,7 +9,7 @@ use crate::shallow::columns::{Columns, NONE, STRIP};
 /// The pipes that are not regular, by the row of their owner.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Links {
-    /// The column that gives where the flux is positive.
+    /// The column that is the donor where the flux is positive.
     pub from: Vec<u32>,
     /// The other column, or [`NONE`]: the outside.
     pub to: Vec<u32>,
@@ -87,7 +87,7 @@ impl Links {
         self.rows[rows.end + 1..].iter_mut().for_each(|end| *end = end.wrapping_add(grows));
     }
 
-    /// Removes all links; rows are counted from the first one added.
+    /// Removes all links; rows are then counted from the first one added.
     pub(in crate::shallow) fn clear(&mut self) {
         self.from.clear();
         self.to.clear();

@@ -67,7 +67,7 @@ impl Layout {
         }
     }
 
-    /// Creates the new columns, for which there must be capacity, and gives them the liquid that finds room in its cell; the rest goes to
+    /// Creates the new columns, whose indices must exist already, and gives them the liquid that finds room in its cell; the rest goes to
     /// `held`. Returns how much did not stay in its column (units).
     pub fn build<'s>(
         &mut self,

@@ -1,4 +1,4 @@
-//! Flow through links: pipes between layers, and out of the domain. They are few, and processed one at a time.
+//! Flow through links: pipes between layers, over cliffs, and out of the domain. They are few, and processed one at a time.
 
 use std::ops::Range;
 

@@ -373,7 +373,7 @@ impl Flow {
         scaled
     }
 
-    /// Divides steps among this many threads, if that is faster; returns whether it is.
+    /// Divides steps among this many threads, if that is faster; returns whether they are divided.
     pub fn divide(&mut self, columns: &Columns, threads: usize) -> bool {
         self.bands.divide(columns, threads);
         self.bands.is_divided()

@@ -145,7 +145,7 @@ impl FlowPoint {
             found.extend(nearest(cell));
         }
         if !has_cells {
-            // A vertex on the border of a terrain may lie slightly outside, as it is rounded to 32 bits.
+            // A point at a vertex on the terrain's border may lie slightly outside, as vertices are rounded to 32 bits.
             let within = |axis: usize, at: f64| {
                 let (low, size) = (grid.origin[axis], grid.size[axis] as f64 * grid.cell);
                 let inside = at.clamp(low, low + size * (1.0 - 1e-12));

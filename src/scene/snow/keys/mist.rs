@@ -42,7 +42,8 @@ pub const MIST_KEYS: &[Key] = &[
 /// Mist without grains; sizes too small for the cell.
 pub fn check_mist(table: &Table, values: &Values) -> Result<()> {
     if !has_grains(values) {
-        return Err(table.error("from_speed", "is the speed of grains that raise mist: the scene needs `[grains]` too"));
+        return Err(table
+            .error("from_speed", "is the speed of grains that raise mist: the scene needs `[grains]` too"));
     }
     let Some(params) = mist_params(values) else { return Ok(()) };
     params.validate().map_err(|error| match error {

@@ -12,7 +12,7 @@ pub struct LateralFriction {
     pub(super) len: usize,
     /// Steps since the frame began.
     pub(super) age: u32,
-    /// Whether each row may have pipes with friction during these steps.
+    /// Whether each row may have pipes with friction; found again every few steps.
     pub(super) rows: Vec<bool>,
     /// The active strips of these rows.
     pub(super) strips: Vec<u32>,

@@ -19,7 +19,7 @@ use crate::shallow::solver::viscous_flux::{Step, max, min, unpacked};
 
 /// Maximum reductions: a pipe is coupled to all within 16 cells.
 const MAX_REDUCTIONS: usize = 4;
-/// If a and b add up to at most this, neighbours take their values of the last step.
+/// If a and b add up to at most this, the neighbours' values of the last step are used.
 const LAG_LIMIT: f32 = 0.5;
 const ZEROS: [f32; STRIP] = [0.0; STRIP];
 

@@ -9,7 +9,7 @@
 //! square duct is 0.7 % below the exact value (White, *Viscous Fluid Flow*, 3-3.3), that of a channel as deep as it is wide 2.8 % below;
 //! flatter ones are closer.
 //!
-//! Differences in y are between a pipe and those beside it; a wall lies half a cell beyond it. The surroundings of a pipe
+//! Differences in y (across the pipe) are between a pipe and those beside it; a wall lies half a cell from it. The surroundings of a pipe
 //! (`surroundings.rs`) are the mean of those of the columns at its ends, so that they are the same from either end. All pipes beside each
 //! other form a line along x or z, which is solved at once (`lines.rs`): neither viscosity nor depth limits the step. Films thinner than a
 //! sixteenth of a cell have no lateral friction. Where a row and the next one have only such films, nothing is computed.

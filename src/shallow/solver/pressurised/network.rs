@@ -43,7 +43,7 @@ pub struct Network {
     has_heads: Vec<bool>,
     /// Indices of the network's pipes to the east, to the south, and of its links, sorted.
     pipe_indices: [Vec<u32>; 3],
-    /// Changes by the network: columns, sorted, and units.
+    /// Changes by the network: column and units, sorted by column.
     moves: Vec<(u32, i32)>,
 }
 
