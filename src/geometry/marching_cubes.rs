@@ -72,8 +72,8 @@ fn share_face(a: Edge, b: Edge) -> bool {
     FACES.iter().any(|face| [ends(a), ends(b)].as_flattened().iter().all(|corner| face.contains(corner)))
 }
 
-/// Triangles that fill a ring, if possible without a diagonal on a face of the cube, where the next cube may have one too. The rings of
-/// [`cases`] allow this.
+/// Triangles that fill a ring without a diagonal on a face of the cube, where the next cube may have one too; `None` if there are no such
+/// triangles. All rings of [`cases`] have them.
 pub fn filled(ring: &[Edge]) -> Option<Vec<[Edge; 3]>> {
     let count = ring.len();
     if count == 3 {

@@ -262,8 +262,8 @@ impl Points {
         }
     }
 
-    /// Appends other points with the same attributes and voxel size; if these are empty, the others replace them. A value that all points
-    /// share stays uniform.
+    /// Appends other points with the same attributes and voxel size; if there are no points yet, the others replace everything. A value that
+    /// all points share stays uniform.
     ///
     /// # Errors
     /// Different attributes or voxels; the points are then unchanged.

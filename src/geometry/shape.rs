@@ -31,8 +31,7 @@ pub fn longest_first([a, b, c]: [DVec3; 3]) -> [DVec3; 3] {
 }
 
 /// Altitude of a triangle on its longest edge, divided by that edge's length, which counts as at least `min_edge`: 0.87 at most, 0 where
-/// all
-/// corners are at one position.
+/// all corners are at one position.
 pub fn altitude(corners: &[DVec3; 3], min_edge: f64) -> f64 {
     let [a, b, c] = corners;
     let square = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());

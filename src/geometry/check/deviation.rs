@@ -11,8 +11,8 @@ const LEAF: usize = 4;
 const GRAIN: usize = 1024;
 /// Size of the stack of a search, which has at most one pending node for each of at most 30 levels.
 const STACK: usize = 64;
-/// A triangle is degenerate if the sine of its first corner's angle is at most this: all of it lies within this fraction of its length from
-/// its edges, and only these are searched.
+/// A triangle is degenerate if the sine of the angle at its first corner is at most this. Only its edges are searched then: every point of
+/// it lies within this fraction of its length from one of them.
 const NEEDLE: f64 = 1e-8;
 /// Distances up to this fraction of the largest coordinate are rounding in 64 bits, and count as 0; meshes have 32-bit coordinates, whose
 /// spacing there is 6e-8 of the coordinate.

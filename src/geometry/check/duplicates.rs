@@ -69,8 +69,7 @@ pub fn by_vertices(triangles: &[[u32; 3]]) -> Vec<([u32; 3], u32, bool)> {
 }
 
 /// Marks the triangles of parts that coincide with an earlier part, triangle by triangle: their keys are the same. Only parts for whose
-/// first
-/// triangle `is_compared` is true are compared.
+/// first triangle `is_compared` is true are compared.
 pub fn copies<K: Ord + Copy + Send>(
     parts: &[u32],
     is_compared: impl Fn(usize) -> bool,

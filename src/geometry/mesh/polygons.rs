@@ -104,8 +104,7 @@ impl PolygonMesh {
     }
 
     /// Triangulates all polygons: calls `each` for each triangle with the start of its polygon in `corners`, the polygon's vertices, and
-    /// the
-    /// indices of the triangle's corners among these.
+    /// the indices of the triangle's corners among these.
     fn cut_all(&self, mut each: impl FnMut(usize, &[u32], [usize; 3])) {
         let mut begin = 0;
         for polygon in self.polygons() {

@@ -12,7 +12,7 @@
 //! 2. The same, but steps are no finer than those at a coordinate of half the open edges' extent: programs that rotate a mesh leave 1e-9
 //!    in one triangle and 0 in another, which by their own size are millions of steps apart. Only where it closes a part wholly: it may
 //!    not bridge a slit of a mesh that is open anyway.
-//! 3. Chains of corners, each within rounding of the next and the ends further apart. Only where it closes a part, and reported.
+//! 3. Chains of corners, each within rounding of the next and the ends further apart. Only where it closes a part, and with a warning.
 //!
 //! The nearest corners are joined first, and never both ends of an edge: a triangle as thin as the rounding is kept.
 

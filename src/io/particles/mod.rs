@@ -12,8 +12,7 @@
 //! Attributes keep the names of the file. Floats become 32-bit, positions stay 64-bit. Signed integers of up to 32 bits become 32-bit,
 //! longer ones 64-bit. As in .ply, `id` becomes 64-bit integers, `active` and `trapped` become `bool`, and a value that all points share is
 //! stored once. Attributes with a number of components other than one or three, texts, and attributes named `P` or without a name are
-//! listed
-//! in a warning and left out.
+//! listed in a warning and left out.
 
 mod bgeo;
 pub mod ply;

@@ -343,7 +343,7 @@ impl Clipper<'_> {
         classify(self.bins, self.exposure, at, hair, &mut self.prisms)
     }
 
-    /// Whether samples are needed at a point: its bin is not a stack, where the surface consists only of patches.
+    /// Whether samples are needed at a point: it has a bin, and that is not a stack, whose surface consists only of patches.
     fn is_sampled(&self, at: Point) -> bool {
         self.bins.of_voxel(voxel_of(at)).is_some_and(|bin| !self.exposure.stacks[bin])
     }

@@ -199,7 +199,7 @@ struct Returns {
     early: Vec<Early>,
 }
 
-/// A point of a tetrahedron.
+/// A sample point of a passage.
 #[derive(Clone, Copy)]
 struct Early {
     id: PassageId,

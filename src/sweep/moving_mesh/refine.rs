@@ -32,8 +32,7 @@ pub fn edge_error([before, after]: [&[DVec3]; 2], [i, j]: [u32; 2]) -> f64 {
 }
 
 /// Splits edges into equal pieces until each error is within `tolerance` (cells), and adds the new vertices to the poses; returns none if
-/// no
-/// edge is split. `wanted` returns whether an edge matters in a step, given the step's two poses.
+/// no edge is split. `wanted` returns whether an edge matters in a step, given the step's two poses.
 ///
 /// # Errors
 /// Cancel; more pieces than fit in memory.

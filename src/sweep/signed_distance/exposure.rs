@@ -166,7 +166,8 @@ impl Exposure {
         meetings.any(|other| (other.position - position).abs() <= off && other.enters == spot.enters)
     }
 
-    /// Calls `see` with each voxel of a block that is within a cell of a meeting on a line through it, and with the distance (cells) to it.
+    /// Calls `see` with each voxel of a block that is within a cell of a meeting on a line through the voxel, and with their distance
+    /// (cells).
     pub fn each_meeting(&self, corner: [i32; 3], mut see: impl FnMut(usize, f32)) {
         for along in &self.along {
             let axis = along.axis;

@@ -96,8 +96,8 @@ const BLOCK_RADIUS: f32 = 6.07;
 const SMALL: f32 = 1.0;
 /// A voxel nearer than this (cells) lies on the surface.
 const ON_FACE: f32 = 1e-4;
-/// Upper bound (cells) on the distance of a voxel whose neighbour has the opposite sign, for a pair without a meeting between them: the
-/// surface then touches one of the two.
+/// Upper bound (cells) on the distances of two neighbouring voxels of opposite sign that have no meeting between them: the surface then
+/// touches one of the two.
 const UNSEEN: f32 = 1.0;
 /// All voxels of a block.
 pub const ALL: Mask = [u64::MAX; 8];
