@@ -142,7 +142,7 @@ uint64_t memory_bytes(const G& grid) noexcept {
 
 template <typename G>
 uint64_t file_bound(const G& grid) noexcept {
-    // Uncompressed sizes in a file of a leaf and of the nodes above it, with a margin for the codec's own data.
+    // Uncompressed sizes of a leaf and of the nodes above it in a file, with a margin for the codec's own data.
     const auto counts = here([&] { return grid.impl->grid->tree().nodeCount(); });
     constexpr uint64_t value = sizeof(grid.impl->grid->background());
     constexpr uint64_t leaf = 512 * value + 3 * 64 + 64;

@@ -70,8 +70,8 @@ private:
     const volatile bool* flag_;
 };
 
-/// Runs work that has no call on this thread alone: outside an arena TBB would start one worker per core, although the
-/// host asked for none.
+/// Runs work that belongs to no call, on this thread alone: outside an arena TBB would start one worker per core,
+/// although the host asked for none.
 template <typename Work>
 auto here(Work&& work) {
     tbb::task_arena arena(1);

@@ -75,7 +75,7 @@
 #define FRZ_BODY_EXACT 1
 
 /**
- * Flag of a body: frz_body.compression is the share of the snow it removes that becomes no grains.
+ * Flag of a body: frz_body.compression replaces frz_grains_params.compression for the snow that the body removes.
  */
 #define FRZ_BODY_COMPRESSION 2
 
@@ -95,7 +95,7 @@
 #define FRZ_GRAINS_BOX 4
 
 /**
- * Flag of frz_grains_params: grains among others feel less of the air than those of a thin spray.
+ * Flag of frz_grains_params: the air slows grains with many neighbours less than those of a thin spray.
  */
 #define FRZ_GRAINS_AIR_BY_DENSITY 8
 
@@ -111,7 +111,7 @@
 #endif
 
 /**
- * No scalar, where a scalar may be given.
+ * In place of the index of a scalar: none.
  */
 #define FRZ_SHALLOW_NO_SCALAR 4294967295
 
@@ -121,12 +121,12 @@
 #define FRZ_SHALLOW_ON_TRIANGLE 1
 
 /**
- * Layer of a volume: all layers.
+ * In place of a layer in frz_shallow_volume: all layers.
  */
 #define FRZ_SHALLOW_ALL_LAYERS 4294967295
 
 /**
- * Column of a sample: there is no column.
+ * In frz_shallow_sample.column: there is no column at the point.
  */
 #define FRZ_SHALLOW_NO_COLUMN 4294967295
 
@@ -148,8 +148,8 @@
 #define FRZ_SHALLOW_LIFTED 4
 
 /**
- * Flag of a layout: where the ground ends over nothing, the surface extends to the ground's edge and comes down to it, instead of ending
- * at the centre of the last cell, open below. frz_shallow_find_ledges must have found the edges since the ground or a body last moved.
+ * Flag of a layout: where the ground ends, the surface extends to the ground's edge and comes down to it, instead of ending at the centre
+ * of the last cell, open below. frz_shallow_find_ledges must have found the edges since the ground or a body last moved.
  */
 #define FRZ_SHALLOW_SKIRTED 8
 
@@ -287,7 +287,7 @@ typedef uint32_t frz_csg;
 #endif // __cplusplus
 
 /**
- * Attributes that frz_grains_read copies; the customary attribute name is in brackets.
+ * Attributes of each grain that frz_grains_read copies; the customary attribute name is in brackets.
  */
 enum frz_grains_attribute
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -327,7 +327,7 @@ enum frz_grains_attribute
      */
     FRZ_GRAINS_ACTIVE = 7,
     /**
-     * int32_t: 1 if it is trapped: a surface that it is in and those around it leave it no room (trapped).
+     * int32_t: 1 if it is trapped: inside a surface, with no room outside all surfaces nearby (trapped).
      */
     FRZ_GRAINS_TRAPPED = 8,
 };
@@ -650,7 +650,7 @@ enum frz_shallow_friction
      */
     FRZ_SHALLOW_GROUND = 0,
     /**
-     * Also at walls and ceilings, and between liquids that flow side by side: ducts and channels carry what theory says. Slower.
+     * Also at walls and ceilings, and between liquids that flow side by side: flow rates in ducts and channels match theory. Slower.
      */
     FRZ_SHALLOW_WALLS = 1,
 };
@@ -671,7 +671,7 @@ enum frz_shallow_law
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * It does not: dye, salt, heat.
+     * Not at all: dye, salt, heat.
      */
     FRZ_SHALLOW_DYE = 0,
     /**
@@ -965,7 +965,7 @@ enum frz_edit_kind
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * It existed before, with the same vertices in the same order of rotation.
+     * It existed before, with the same vertices in the same cyclic order.
      */
     FRZ_EDIT_WHOLE = 0,
     /**
@@ -1075,19 +1075,19 @@ typedef struct frz_shallow frz_shallow;
  * the length everywhere else, where a frame takes a quarter of the time. No liquid is lost between them.
  *
  * It has no falls and no thickening. frz_shallow_detail_step, _surface, _save and _set_bodies are real-time calls, as frz_shallow defines
- * it; _set_near, _update_terrain and _update_heights may allocate, and so may _restore if it moves the box.
+ * them; _set_near, _update_terrain and _update_heights may allocate, and so may _restore if it moves the box.
  */
 typedef struct frz_shallow_detail frz_shallow_detail;
 
 /**
- * A copy of a liquid as it was after a frame: another thread may draw it while the next frame is computed. A host has two: one being
- * taken, and one being drawn.
+ * A copy of a liquid as it was after a frame: another thread may draw it while the next frame is computed. A host uses two: one is taken
+ * while the other is drawn.
  */
 typedef struct frz_shallow_snapshot frz_shallow_snapshot;
 
 /**
  * Stains on the vertices of a mesh, and the liquid that it has absorbed: they move with ground that deforms. The mesh need not be the one
- * that the liquid was created with, but it lies where the liquid's ground is.
+ * that the liquid was created with, but must lie on the liquid's ground.
  */
 typedef struct frz_shallow_stains frz_shallow_stains;
 
@@ -1442,7 +1442,7 @@ typedef struct {
      */
     uint32_t struct_size;
     /**
-     * A frz_grid_class. A level set takes the sign of its band everywhere outside the leaves. For vectors FRZ_GRID_UNKNOWN or
+     * A frz_grid_class. Outside its leaves a level set has the sign of the adjacent part of its band. For vectors FRZ_GRID_UNKNOWN or
      * FRZ_GRID_STAGGERED.
      */
     uint32_t grid_class;
@@ -1480,7 +1480,7 @@ typedef struct {
      */
     float background_vector[3];
     /**
-     * Leaves of a grid of vectors, as leaves, which must then be NULL; else NULL.
+     * Leaves of a grid of vectors, under the same rules as leaves, which must then be NULL; for floats NULL.
      */
     const frz_vector_leaf *vector_leaves;
 } frz_grid_desc;
@@ -1511,8 +1511,8 @@ typedef struct {
      */
     frz_view positions_end;
     /**
-     * Poses at equal intervals between the two, each float[3] for each vertex; vertices move straight from pose to pose. NULL for none, as
-     * it must be without positions_end.
+     * Poses at equal intervals between positions and positions_end, each float[3] for each vertex; vertices move straight from pose to
+     * pose. NULL for none, as it must be without positions_end.
      */
     const frz_view *between;
     /**
@@ -1529,8 +1529,8 @@ typedef struct {
     frz_view indices;
     /**
      * Friction of grains against it, 0 to 10; only grains use it. It holds them, and carries them along while the body moves; loose grains
-     * that slide over a body at rest are subject to the friction between grains instead. 0.3 for headers of interface 1.1 and from
-     * frz_body_init.
+     * that slide over a body at rest are subject to the friction between grains instead. frz_body_init sets 0.3, which also applies to
+     * headers of interface 1.1, without this field.
      */
     double friction;
     /**
@@ -1538,14 +1538,14 @@ typedef struct {
      */
     double stick;
     /**
-     * Replaces frz_grains_params.compression, 0 to 1; only with FRZ_BODY_COMPRESSION, and only grains use it. Where several bodies with
-     * different values removed the snow, the value of the body whose surface came nearest to the position applies.
+     * Replaces frz_grains_params.compression, 0 to 1; only with FRZ_BODY_COMPRESSION, and only grains use it. Where bodies with different
+     * values have removed snow, the body whose surface came nearest to a position decides there.
      */
     double compression;
 } frz_body;
 
 /**
- * Irregularity of a surface: where the noise is positive it moves outward.
+ * Irregularity of a surface, which moves outward where the noise is positive.
  */
 typedef struct {
     /**
@@ -1682,8 +1682,8 @@ typedef struct {
      */
     uint32_t flags;
     /**
-     * Radius of a grain (m), 1e-5 to 1; with a base layer 0.02 to 0.5 of its voxel. A third of the voxel gives the thesis' look; default:
-     * that for voxels of 1 cm.
+     * Radius of a grain (m), 1e-5 to 1; with a base layer 0.02 to 0.5 of its voxel. A third of the voxel gives the look of the thesis;
+     * default 0.01 / 3, for voxels of 1 cm.
      */
     double radius;
     /**
@@ -1691,8 +1691,8 @@ typedef struct {
      */
     double compression;
     /**
-     * Friction between grains, 0 to 1; default 0.14. As grains do not rotate, 0.14 already holds a slope of 32 degrees; with attraction
-     * 0.26 does. On the base layer they rest up to the same slope.
+     * Friction between grains, 0 to 1; default 0.14. As grains do not rotate, a friction of 0.14 already holds a slope of 32 degrees;
+     * grains that attract each other need 0.26. Grains rest on the base layer up to the same slope.
      */
     double friction;
     /**
@@ -1728,11 +1728,11 @@ typedef struct {
      */
     double keep_high[3];
     /**
-     * Seconds after which a grain is removed, counted by the frames of its birth and of the step; default 0: never.
+     * Age (s) at which a grain is removed: the frame number of the step minus that of its birth, times dt. Default 0: never.
      */
     double lifetime;
     /**
-     * Maximum number of grains, 1 to 60000000: a step or an emission that would exceed it fails. Default 20000000.
+     * Maximum number of grains, 1 to 60000000: a step or frz_grains_emit fails if it would exceed this. Default 20000000.
      */
     uint64_t max_grains;
     /**
@@ -1771,7 +1771,7 @@ typedef struct {
      */
     uint64_t count;
     /**
-     * Those at rest: nothing moves them until something wakes them.
+     * Grains at rest, which do not move until something wakes them.
      */
     uint64_t resting;
     /**
@@ -1787,7 +1787,7 @@ typedef struct {
      */
     uint64_t expired;
     /**
-     * Grains that are pressed where there is no room for them: the attribute FRZ_GRAINS_TRAPPED.
+     * Grains whose attribute FRZ_GRAINS_TRAPPED is 1.
      */
     uint64_t trapped;
     /**
@@ -1899,7 +1899,7 @@ typedef struct {
      */
     double mass;
     /**
-     * Maximum divergence left by a projection, times the cell, over the maximum speed before it.
+     * Maximum divergence left by a projection, times the cell, divided by the maximum speed before the projection.
      */
     double divergence;
     /**
@@ -1941,8 +1941,8 @@ typedef struct {
      */
     double half_life;
     /**
-     * How much detail fades where the mesh is strained: to exp(-fade) of itself while lengths change by a factor of e, 0 to 1000; default
-     * 0: not at all.
+     * How much detail fades where the mesh is strained, 0 to 1000: a change of lengths by a factor of e leaves exp(-fade) of the detail.
+     * Default 0: it does not fade.
      */
     double fade;
     /**
@@ -2040,7 +2040,7 @@ typedef struct {
      */
     uint64_t drops;
     /**
-     * Likewise, bubbles inside it.
+     * Parts of that surface inside the mesh that the mesh lacks: bubbles.
      */
     uint64_t bubbles;
     /**
@@ -2103,8 +2103,8 @@ typedef struct {
      */
     double thinning_power;
     /**
-     * Gravity (m/s2), default (0, -9.81, 0). It may rotate from frame to frame: it points down by 0.001 to 1000, and leans by at most 45
-     * degrees.
+     * Gravity (m/s2), default (0, -9.81, 0). Its y is -1000 to -0.001, and neither x nor z exceeds it in magnitude. It may rotate from
+     * frame to frame.
      */
     double gravity[3];
     /**
@@ -2132,8 +2132,8 @@ typedef struct {
      */
     uint32_t reserved;
     /**
-     * Height (m) from which liquid falls freely over an edge, 0 or more; default 0.01. Steps lower than the edge of a cell are never
-     * falls. This and the following falls_ fields apply only if falls_most is over 0, and cannot change.
+     * Height (m) from which liquid falls freely over an edge, 0 or more; default 0.01. Where the ground drops by less than the edge of a
+     * cell, liquid never falls freely. This and the following falls_ fields apply only if falls_most is over 0, and cannot change.
      */
     double falls_height;
     /**
@@ -2141,8 +2141,8 @@ typedef struct {
      */
     double falls_interval;
     /**
-     * Volume of a drop (m3), 0 or more; default 6.5e-11, a sphere of half a millimetre. Where a drop takes longer than 8 intervals to
-     * fill, liquid drips.
+     * Volume of a drop (m3), 0 or more; default 6.5e-11, a sphere with a diameter of half a millimetre. Where a drop takes longer than 8
+     * intervals to fill, liquid drips.
      */
     double falls_drop;
     /**
@@ -2173,8 +2173,8 @@ typedef struct {
      */
     double thickening_from;
     /**
-     * Concentration from which viscosity is thickening_times that, linear in between; finite, not equal to thickening_from, but it may be
-     * less.
+     * Concentration from which viscosity is that of the liquid times thickening_times, and linear in between; finite, more or less than
+     * thickening_from.
      */
     double thickening_to;
     /**
@@ -2251,8 +2251,8 @@ typedef struct {
      */
     uint64_t filled;
     /**
-     * Rows of cells, summed over steps, in which films on slopes would have been too fast for steps of this length, and were slowed down:
-     * shorter steps do not limit them.
+     * Rows of cells, summed over steps, in which films on slopes would have been too fast for steps of this length, and were slowed down;
+     * with shorter steps they would not be.
      */
     uint64_t slowed;
 } frz_shallow_report;
@@ -2286,8 +2286,7 @@ typedef struct {
      */
     double at[3];
     /**
-     * It acts on cells whose centres lie within this distance of the position, seen from above (m), 0 or more; on the nearest cell if
-     * there are none.
+     * Radius (m), 0 or more: the point acts on cells whose centres lie within it, seen from above; on the nearest cell if there are none.
      */
     double radius;
     /**
@@ -2358,7 +2357,8 @@ typedef struct {
      */
     double held;
     /**
-     * Error of the sum above, in units (2^-30 of the range of heights, of a cell): 0, as all are integers.
+     * Error of the balance above, in units of volume (2^-30 of the range of heights, times the area of a cell): always 0, since all
+     * amounts are integers.
      */
     int64_t error;
     /**
@@ -2445,7 +2445,7 @@ typedef struct {
      */
     uint32_t layers;
     /**
-     * Number of column indices: 16 for each strip of 16 cells along x that has a column of a layer. Some indices may have no column.
+     * Number of column indices: 16 for each strip (16 cells along x on one layer) that has a column. Some indices may have no column.
      */
     uint64_t index_count;
     /**
@@ -2556,7 +2556,7 @@ typedef struct {
      */
     frz_span depths;
     /**
-     * float for each vertex: depth over frz_shallow_layout.opaque_depth, at most 1.
+     * float for each vertex: depth divided by frz_shallow_layout.opaque_depth, at most 1.
      */
     frz_span opacities;
     /**
@@ -2625,11 +2625,11 @@ typedef struct {
      */
     uint64_t upward;
     /**
-     * Those of them more than a cell above the surrounding ground: they may be above the surface.
+     * Vertices more than a cell above the surrounding ground, which may show through the surface.
      */
     uint64_t discarded;
     /**
-     * Of the others, those too close below a ceiling.
+     * Of the others, those so close to a ceiling that the surface cannot cover them.
      */
     uint64_t capped;
 } frz_shallow_fitted;
@@ -2651,8 +2651,8 @@ typedef struct {
      */
     const char *name;
     /**
-     * Concentrations are within -range to range, in the scalar's own unit, with a resolution of 2^-20 of it: 1e-9 to 1e9. For a dye 1, for
-     * an age 3600 (s).
+     * Bound of the concentrations, 1e-9 to 1e9, in the scalar's own unit: they lie within -range to range, with a resolution of 2^-20 of
+     * the range. Suitable values are 1 for a dye and 3600 (s) for an age.
      */
     double range;
     /**
@@ -2711,7 +2711,7 @@ typedef struct {
      */
     double falling;
     /**
-     * Added by its law; negative: taken.
+     * Added by its law; negative: removed.
      */
     double grown;
     /**
@@ -2719,7 +2719,7 @@ typedef struct {
      */
     double dried;
     /**
-     * Error of the sum above, in the smallest amounts: 0, as all are integers.
+     * Error of the balance above, in units of the smallest amount: always 0, since all amounts are integers.
      */
     int64_t error;
 } frz_shallow_scalar_balance;
@@ -2805,8 +2805,8 @@ typedef struct {
      */
     uint32_t flags;
     /**
-     * Index of the scalar that stains (frz_shallow_set_scalars), from 0, by its concentration over its range, clamped to 0 to 1: clear
-     * liquid washes stains off. Default FRZ_SHALLOW_NO_SCALAR: any liquid stains, fully.
+     * Index of the scalar that stains (frz_shallow_set_scalars), from 0. A stain approaches its concentration divided by its range,
+     * clamped to 0 to 1, so that clear liquid washes stains off. Default FRZ_SHALLOW_NO_SCALAR: any liquid stains, fully.
      */
     uint32_t scalar;
     /**
@@ -2826,7 +2826,7 @@ typedef struct {
      */
     double half_life;
     /**
-     * Maximum that the ground absorbs (m: m3 for each m2 of its mesh), 0 to 1000: gauze some 1e-3. Default 0: nothing.
+     * Maximum that the ground absorbs (m: m3 for each m2 of its mesh), 0 to 1000; about 1e-3 for gauze. Default 0: nothing.
      */
     double capacity;
     /**
@@ -2856,11 +2856,11 @@ typedef struct {
      */
     double radius;
     /**
-     * Time since it left the edge that it falls from (s).
+     * Time since it left the edge that it fell from (s).
      */
     double age;
     /**
-     * Id of that edge: the same for all drops from one side of one column.
+     * Id of the edge that it fell from: the same for all drops from one side of one column.
      */
     uint64_t source;
     /**
@@ -3130,26 +3130,30 @@ frz_status frz_mesh_read(const frz_mesh *mesh,
  * Copies an attribute of a mesh into the caller's memory.
  *
  * name: its name. FRZ_ERROR_ARGUMENT, with a list of the existing names, if there is none of this name.
- * dst: room for one element of that many floats for each vertex; with data NULL only components is reported.
+ * dst: room for one element for each vertex, of as many floats as components reports; with data NULL only components is reported.
  * components: receives the number of floats for each vertex, 1 to 4; 0 after a failure. May be NULL.
  *
  * Any number of threads may read a mesh.
  */
-frz_status frz_mesh_attribute(const frz_mesh *mesh, const char *name, frz_span dst, uint32_t *components);
+frz_status frz_mesh_attribute(const frz_mesh *mesh,
+                              const char *name,
+                              frz_span dst,
+                              uint32_t *components);
 
 /**
  * Creates a closed mesh from one that is open, intersects itself, or is inside out in parts: the solid of all points that lie inside at
  * least one part, with each part turned outward. Overlapping parts are united, holes are closed, cavities are filled.
  *
- * The mesh is rebuilt in the cells of a grid where it has faults, and within a cell of that solid; all other triangles are kept unchanged.
- * Remaining vertices keep their order and their attributes; new ones take the attributes that the mesh had at the nearest position. All
- * faces of the result are triangles, each edge has two consistently oriented ones, and the triangles around each vertex form a single
- * ring.
+ * Where the mesh has faults it is rebuilt in the cells of a grid, within a cell of that solid's surface; all other triangles are kept
+ * unchanged. Remaining vertices keep their order and their attributes; new ones take the attributes that the mesh had at the nearest
+ * position. All faces of the result are triangles, each edge belongs to two consistently oriented triangles, and the triangles around each
+ * vertex form a single ring.
  *
  * mesh: not modified.
  * cell: edge of a cell (m), 1e-9 to 1e6, about as long as the mesh's edges: where the mesh is rebuilt, thinner features may be lost.
  *     FRZ_ERROR_ARGUMENT if the mesh reaches farther than 131072 cells from its middle, encloses nothing, or would be lost almost
- *     entirely. Smaller losses cause a warning: half of the volume, or a twentieth of its extent and two cells.
+ *     entirely. Smaller losses cause a warning: of more than half of the volume, or of an extent of more than two cells and more than a
+ *     twentieth.
  * out: receives the new mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
  * report: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
  *
@@ -3250,7 +3254,7 @@ frz_status frz_grid_probe(const frz_grid *grid, frz_view origins, frz_span dst);
 /**
  * Lends the leaves of a grid of vectors without copying them, in an order that changes only when the grid changes.
  *
- * Blocks without a leaf have a single value: the background, or that of frz_grid_vector_probe.
+ * Blocks without a leaf have a single value, which frz_grid_vector_probe reports.
  *
  * dst: room for leaf_count elements of frz_vector_leaf; with data NULL only the count is reported. FRZ_ERROR_CAPACITY if it is too small.
  *     The pointers in it belong to the grid: they are valid until it is destroyed.
@@ -3538,7 +3542,7 @@ frz_status frz_levelset_offset(frz_context *context, frz_grid *inout, float dist
  *
  * inout: owned by the caller; unchanged after a failure.
  * smoothing: a frz_smoothing.
- * width: means are over cubes of 2 width + 1 voxels, 1 to 32.
+ * width: 1 to 32; means are taken over cubes with an edge of 2 width + 1 voxels.
  * times: number of passes, 1 to 1000.
  * scheme: a frz_scheme.
  *
@@ -3567,7 +3571,7 @@ frz_status frz_levelset_displace(frz_context *context, frz_grid *inout, const fr
  * It is exact to 0.02 voxel: no dents between poses, no ripples.
  *
  * bodies: count bodies, at least one. A vertex farther than 131064 voxels from the first vertex of the first body is out of reach:
- *     FRZ_ERROR_ARGUMENT names its body, counted from 0.
+ *     FRZ_ERROR_ARGUMENT names the index of its body.
  * dt: length of the step (s); 0: the bodies at their positions at its beginning.
  * voxel_size: edge of a voxel (m), 1e-6 to 1000.
  * half_width: half width of the band of distances (voxels), 3 to 64.
@@ -3658,7 +3662,7 @@ frz_status frz_base_set_params(frz_base *base,
  * Results replace the layer's grids only at the end: after a failure or a cancel the layer is as it was before.
  *
  * bodies: count bodies; NULL with a count of 0. What passes farther than 131072 voxels from the middle of the snow is left out. If a body
- *     touches the snow while a vertex of it is that far away, FRZ_ERROR_ARGUMENT names it, counted from 0, and nothing is changed.
+ *     touches the snow while one of its vertices is that far away, FRZ_ERROR_ARGUMENT names the body's index, and nothing is changed.
  * count: number of bodies.
  * dt: length of the step (s). 0: the bodies are cut out at their positions at its beginning, as the first frame of a shot requires.
  * frame: the value that frz_base_touched takes where the snow changes, -16777216 to 16777216.
@@ -3711,7 +3715,7 @@ const frz_grid *frz_base_grid(const frz_base *base);
 const frz_grid *frz_base_removed(const frz_base *base);
 
 /**
- * Lends the compression of the snow: the fraction of its column's height that was removed, 0 to 1, at touched voxels of the surface.
+ * Lends the compression of the snow: at each touched voxel of the surface, the fraction of its column's height that was removed, 0 to 1.
  *
  * The layer owns the grid, as that of frz_base_grid.
  *
@@ -3767,7 +3771,8 @@ frz_status frz_grains_params_init(frz_grains_params *params, size_t size);
  *
  * params: friction and attraction are set, for grains of its radius.
  * repose_angle_deg: slope at which a poured pile comes to rest (degrees), 0 to 42.
- * stands: height of a wall of grains that just stands (m), 0 to 1000; measured up to 64 diameters. 0: no attraction.
+ * stands: height of a wall of grains that just stands (m), 0 to 1000. 0: no attraction. The conversion to attraction was measured only for
+ *     walls of up to 64 diameters.
  *
  * Any thread.
  */
@@ -3875,7 +3880,7 @@ frz_status frz_grains_step_grids(frz_context *context,
  * first: receives the id of the first new grain; the others follow in the order of the positions. -1 if there are none, 0 after a failure;
  *     may be NULL.
  *
- * After a failure no grain was added; the error names the first element at fault, counted from 0. One thread at a time.
+ * After a failure no grain was added; the error names the index of the first element at fault. One thread at a time.
  */
 frz_status frz_grains_emit(frz_context *context,
                            frz_grains *grains,
@@ -3980,8 +3985,8 @@ frz_status frz_mist_set_params(frz_mist *mist,
  *
  * grains: the grains after their step; they are only read. NULL: none raise mist.
  * base: the layer after its step, around which the air flows; it is only read. NULL: there is none.
- * wind: a grid of velocities (m/s) towards which the air moves where there is mist, by half of the difference in a tenth of a second; a
- *     component that is not within 1000 m/s of 0 where there is air is FRZ_ERROR_ARGUMENT. NULL: only frz_mist_params.wind.
+ * wind: a grid of velocities (m/s) that the air approaches where there is mist: half of the difference is gone after a tenth of a second.
+ *     A component beyond 1000 m/s where there is air is FRZ_ERROR_ARGUMENT. NULL: only frz_mist_params.wind.
  * bodies: count bodies that bound the air and carry it along; NULL with a count of 0. Bodies that do not move have no positions_end. If
  *     the openings of a body exceed a tenth of its area, air flows around both of its sides. A body with a vertex that moves faster than
  *     100 m/s is treated as jumping: it stands at positions_end for the whole step.
@@ -4037,13 +4042,13 @@ frz_status frz_mist_save(frz_context *context,
  * its own, or only their files.
  *
  * Each point is assumed to have moved at its final velocity for all of dt, even if it was hit or born during the step: where points begin
- * to fly this raises more mist, the more the longer the steps. A host that knows where points were calls frz_mist_step_paths.
+ * to fly this raises too much mist, and more with longer steps. A host that knows where points were should call frz_mist_step_paths.
  *
  * positions: double[3] for each point at the step's end (m), finite, within 1e7 cells of the origin along each axis.
  * velocities: float[3] for each point (m/s), finite.
  * radius: of the points (m), above 0 and at most 64 cells.
- * snow: a level set around which the air flows, with voxels fixed in world space, before the layer's step, in which bodies move into it.
- *     NULL: there is none.
+ * snow: the snow around which the air flows, as it was before the layer's step, in which bodies press into it: a level set with voxels
+ *     fixed in world space. NULL: there is none.
  * wind: as for frz_mist_step.
  * bodies: as for frz_mist_step.
  * count: as for frz_mist_step.
@@ -4130,7 +4135,8 @@ frz_status frz_particles_spacing(frz_context *context,
  * params: see frz_tracker_params.
  * mesh: the mesh at the first frame, in the particles' space; also with a restart. It is copied. It may be open, intersect itself and
  *     repeat vertices; with params.rebuild it must be closed, each edge with two consistently oriented triangles, and the triangles around
- *     each vertex a single ring: see frz_mesh_repair. FRZ_ERROR_ARGUMENT says where it is not, or that it is not where the particles are.
+ *     each vertex a single ring: see frz_mesh_repair. The message of FRZ_ERROR_ARGUMENT says where it is not, or that mesh and particles
+ *     lie apart.
  * particles: those of the first frame; NULL with a restart.
  * restart: restart_bytes bytes that frz_tracker_save wrote for a tracker with the same mesh, spacing and cell: it is restored bit for bit,
  *     on any number of threads. NULL: none. FRZ_ERROR_FILE if they are damaged, or of another version, mesh, spacing or cell.
@@ -4168,7 +4174,7 @@ frz_status frz_tracker_set_params(frz_tracker *tracker,
 
 /**
  * Prefetches the particles of the step after the next: with frz_tracker_params.rebuild their surface is computed on idle threads while the
- * next step rebuilds the mesh. The result is identical; if other particles then come, time was wasted. Of no use with
+ * next step rebuilds the mesh. The result is identical; if that step then gets other particles, the work was wasted. Unnecessary with
  * frz_tracker_read_eased, which computes the coming steps itself.
  *
  * particles: those of that step; they are copied.
@@ -4228,7 +4234,7 @@ frz_status frz_tracker_save(frz_context *context,
  * now: the particles at the end of the last step, or those that the tracker was created with.
  * coming: count pointers to the particles of the coming frames, in order, each dt after the previous one; NULL if count is 0.
  * count: 0 to ahead; less than ahead where the shot ends.
- * ahead: number of steps before a change in which vertices start to move, 1 to 100; 4 is a good value. The same in all frames.
+ * ahead: number of steps before a change in which vertices start to move, 1 to 100; 4 is a good value. Pass the same number in all frames.
  * dt: time between frames (s), above 0.
  * dst: room for as many double[3] as frz_tracker_count reports (m); FRZ_ERROR_CAPACITY if it is too small, and nothing is written.
  *
@@ -4317,9 +4323,9 @@ frz_status frz_tracker_read_edits(const frz_tracker *tracker,
 
 /**
  * Copies for each vertex where the liquid there was at the first frame, according to the nearby particles that already existed then. With
- * it a host carries its own textures and arrays through merges and splits: vertices that a step made (frz_tracker_read_edits) take what
- * the mesh of the first frame has at the position nearest to where their liquid was. The corners of a triangle may come from far apart
- * where liquids have merged: all of them should then take their values from near one of them.
+ * it a host carries its own textures and arrays through merges and splits: new vertices (frz_tracker_read_edits) take what the mesh of the
+ * first frame has nearest to these positions. The corners of a triangle may come from far apart where liquids have merged: all of them
+ * should then take their values from near one of them.
  *
  * first: the particles at the first frame, with ids.
  * now: the particles at the end of the last step, with ids.
@@ -4335,15 +4341,15 @@ frz_status frz_tracker_read_rest(frz_context *context,
                                  frz_span dst);
 
 /**
- * Replaces the tracker's mesh by an edited one: an artist's change in the middle of a shot. The distance of each of its vertices from the
- * particles' surface is measured again, and kept from then on. After a failure or a cancel the tracker is as it was.
+ * Replaces the tracker's mesh by an edited one: an artist's change in the middle of a shot. The distance of each new vertex from the
+ * particles' surface is measured now, and kept from then on. After a failure or a cancel the tracker is as it was.
  *
- * The parameters stay. All vertices and triangles count as new: frz_tracker_edits reports 1, and frz_tracker_read_edits reports all as
- * made; the positions before (FRZ_EDIT_BEFORE) are those to which the last step led. States saved from then on hold the edited mesh, but
- * are still restored with the mesh that the tracker was created with (frz_tracker_create).
+ * The parameters stay. All vertices and triangles count as new: frz_tracker_edits reports 1, and FRZ_EDIT_BEFORE holds the positions to
+ * which the last step moved the previous vertices. States saved from then on hold the edited mesh, but are still restored with the mesh
+ * that the tracker was created with (frz_tracker_create).
  *
  * mesh: as for frz_tracker_create, with any vertices and faces, in the particles' space; it is copied. Its attribute "detail", of one
- *     float, says what does not fade, even if the previous mesh had none.
+ *     float, says where detail does not fade, even if the previous mesh had no such attribute.
  * particles: those at the end of the last step, or those that the tracker was created with: the next step begins with them.
  *
  * One thread at a time; any number may read a mesh.
@@ -4494,11 +4500,11 @@ frz_status frz_shallow_last_steps(const frz_shallow *shallow,
                                   size_t *count);
 
 /**
- * Sets sources, drains and absorbers, replacing those before; what those have moved remains in frz_shallow_balance. An absorber that is
+ * Sets sources, drains and absorbers, replacing the previous ones; what those moved remains in frz_shallow_balance. An absorber that is
  * set again is dry. The next frame may allocate.
  *
- * flows: count flow points; NULL with a count of 0: none. FRZ_ERROR_ARGUMENT names one that is out of range, or lies inside a solid or
- *     outside the domain, counted from 0; the old ones are then kept.
+ * flows: count flow points; NULL with a count of 0: none. FRZ_ERROR_ARGUMENT names the index of one that is out of range, or lies inside a
+ *     solid or outside the domain; the old ones are then kept.
  * count: number of flow points.
  *
  * One thread at a time.
@@ -4598,12 +4604,12 @@ frz_status frz_shallow_update_heights(frz_context *context,
                                       frz_shallow_moved *moved);
 
 /**
- * Sets the solids that move over the ground, replacing those before (a real-time call: see frz_shallow): the ground is rebuilt where one
- * moves, and no triangle is visited. The liquid is displaced, and none of it is lost. After a failure all is as it was.
+ * Sets the solids that move over the ground, replacing the previous ones (a real-time call: see frz_shallow): the ground is rebuilt where
+ * one moves, and no triangle is visited. The liquid is displaced, and none of it is lost. After a failure all is as it was.
  *
  * A body is identified by its index: keep it at the same one from call to call. Bodies that do not move cost nothing.
  *
- * bodies: count bodies; NULL with a count of 0: none. FRZ_ERROR_ARGUMENT names one that is out of range, counted from 0.
+ * bodies: count bodies; NULL with a count of 0: none. FRZ_ERROR_ARGUMENT names the index of one that is out of range.
  * count: number of bodies.
  * moved: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
  *
@@ -4628,7 +4634,7 @@ frz_status frz_shallow_get_info(const frz_shallow *shallow, frz_shallow_info *in
  * Copies an array of columns.
  *
  * array: a frz_shallow_array, which states the type of the elements.
- * columns: uint32_t for each requested column, its index; data NULL with a count of 0: all indices, in order.
+ * columns: uint32_t, the index of each requested column; data NULL with a count of 0: all indices, in order.
  * dst: room for as many elements; FRZ_ERROR_CAPACITY if it is too small, and nothing is written.
  *
  * Any number of threads may read a shallow liquid.
@@ -4694,8 +4700,9 @@ frz_status frz_shallow_save(frz_context *context,
                             size_t *size);
 
 /**
- * Replaces the liquid's state by a saved one (a real-time call: see frz_shallow): from there it flows as the saved one did, to the same
- * bytes, with the same parameters, flow points and bodies, which must be set before. The volumes moved by flow points are restored too.
+ * Replaces the liquid's state by a saved one (a real-time call: see frz_shallow): the liquid then continues as the saved one did, to the
+ * same bytes, with the same parameters, flow points and bodies, which must be set before. The volumes moved by flow points are restored
+ * too.
  *
  * state: bytes bytes of frz_shallow_save. FRZ_ERROR_FILE, with the liquid unchanged, if they are damaged, or of another version, another
  *     ground or border, or other kinds of flow points.
@@ -4749,9 +4756,9 @@ frz_status frz_shallow_surface(frz_context *context,
                                frz_shallow_size *size);
 
 /**
- * Finds the ledges, where the ground ends over nothing, as at the edges of shelves and of holes, for surfaces with FRZ_SHALLOW_SKIRTED.
- * With the mesh that the liquid was created with, the edge is located between the centres of cells; on other ground the surface extends by
- * half a cell. A real-time call (see frz_shallow): it visits all triangles once. Call it again after frz_shallow_update_terrain or
+ * Finds the ledges, where the ground ends, as at the edges of shelves and of holes, for surfaces with FRZ_SHALLOW_SKIRTED. With the mesh
+ * that the liquid was created with, the edge is located between the centres of cells; on other ground the surface extends by half a cell.
+ * A real-time call (see frz_shallow): it visits all triangles once. Call it again after frz_shallow_update_terrain or
  * frz_shallow_set_bodies have moved something, before the next such surface.
  *
  * size: receives the maximum that this adds to frz_shallow_surface_bound, all zeroes after a failure; may be NULL. Its struct_size is set
@@ -4782,10 +4789,10 @@ frz_status frz_shallow_find_lifts(frz_context *context,
                                   frz_shallow_fitted *fitted);
 
 /**
- * Sets the scalars that the liquid carries, replacing those before. They are 0 everywhere at first, and 0 in what is poured and what comes
- * through sources until frz_shallow_set_poured and frz_shallow_set_sourced. The next frame may allocate.
+ * Sets the scalars that the liquid carries, replacing the previous ones. They are 0 everywhere at first; poured liquid has 0 until
+ * frz_shallow_set_poured is called, and liquid from sources until frz_shallow_set_sourced is. The next frame may allocate.
  *
- * scalars: count scalars; NULL with a count of 0: none. FRZ_ERROR_ARGUMENT names one that is out of range, counted from 0; the old ones
+ * scalars: count scalars; NULL with a count of 0: none. FRZ_ERROR_ARGUMENT names the index of one that is out of range; the old scalars
  *     are then kept.
  * count: number of scalars, up to FRZ_SHALLOW_MOST_SCALARS.
  *
@@ -4819,7 +4826,7 @@ frz_status frz_shallow_set_sourced(frz_shallow *shallow, size_t flow, frz_view c
  * Copies the concentrations of a scalar (a real-time call: see frz_shallow); 0 where it is dry.
  *
  * scalar: its index, from 0.
- * columns: uint32_t for each requested column, its index; data NULL with a count of 0: all indices, in order.
+ * columns: uint32_t, the index of each requested column; data NULL with a count of 0: all indices, in order.
  * dst: room for a float for each; FRZ_ERROR_CAPACITY if it is too small, and nothing is written.
  *
  * Any number of threads may read a shallow liquid.
@@ -4955,8 +4962,8 @@ frz_status frz_shallow_stains_create(frz_context *context,
                                      frz_shallow_stains **out);
 
 /**
- * Lets the liquid stain the ground, and the ground absorb liquid, for the time since the last call, once a frame (a real-time call: see
- * frz_shallow).
+ * Lets the liquid stain the ground, and the ground absorb liquid, for the time since the last call (a real-time call: see frz_shallow).
+ * Call it once a frame.
  *
  * shallow: the liquid, after its frame; only ground with a capacity changes it. What it absorbs is part of frz_shallow_balance.absorbed.
  * positions: float[3] for each vertex (m), finite: the current ones. After a failure all is as it was.
@@ -5101,8 +5108,8 @@ frz_status frz_shallow_snapshot_probe(const frz_shallow_snapshot *snapshot,
  * params: NULL for the defaults. Without falls and thickening.
  * domain: where liquid can be. Its numbers of cells are even.
  * mesh: it is copied.
- * near: double[4], minimum x, minimum z, maximum x and maximum z (m): the small cells are those of the smallest box of pairs of cells that
- *     contains it, within the domain; all cells may be small. FRZ_ERROR_ARGUMENT if it lies outside.
+ * near: double[4], minimum x, minimum z, maximum x and maximum z (m): the box in which cells are small, enlarged to whole pairs of cells
+ *     along x and z, within the domain; all cells may be small. FRZ_ERROR_ARGUMENT if it lies outside the domain.
  * out: receives the liquid, to be destroyed with frz_shallow_detail_destroy; NULL after a failure.
  *
  * Any number of threads may read a mesh; one thread at a time for each context.
@@ -5242,8 +5249,8 @@ frz_status frz_shallow_detail_pour(frz_shallow_detail *detail,
 frz_status frz_shallow_detail_fill(frz_shallow_detail *detail, double height);
 
 /**
- * Reports where all liquid is, and where it came from. The remainder of each large cell, less than its unit, which is four units of small
- * cells, is part of held.
+ * Reports where all liquid is, and where it came from. Each large cell has a remainder of less than its unit, which is four units of a
+ * small cell; these remainders are part of held.
  *
  * balance: receives it, all zeroes after a failure. Its struct_size is set by the caller.
  *

@@ -85,7 +85,7 @@ impl Error {
         Self::Argument(what.into())
     }
 
-    /// An error about an argument that comes from a file, as one about the file; other errors stay as they are.
+    /// Turns an error about an argument that comes from a file into one about the file; other errors stay as they are.
     pub fn in_file(self, path: impl AsRef<Path>) -> Self {
         self.in_file_at(path, "")
     }
@@ -122,7 +122,7 @@ pub fn visible(text: &str) -> String {
     text.chars().map(shown).collect()
 }
 
-/// Whether a terminal obeys a character instead of showing it, or it is invisible or changes the direction of text.
+/// Whether a character controls a terminal instead of being shown, is invisible, or changes the direction of text.
 fn is_control(character: char) -> bool {
     let invisible =
         ['\u{200b}'..='\u{200f}', '\u{2028}'..='\u{202e}', '\u{2060}'..='\u{2069}', '\u{feff}'..='\u{feff}'];

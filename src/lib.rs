@@ -20,7 +20,7 @@
 //! | render previews | [`render`] |
 //! | link from C or C++ | `include/frazil.h`, generated from [`capi`] |
 //!
-//! Everything that takes long takes a [`Context`]: threads, cancel, progress and the times of its phases.
+//! Everything that takes a long time takes a [`Context`]: threads, cancel, progress and the times of its phases.
 //!
 //! # A step of snow
 //!

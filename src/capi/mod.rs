@@ -1,7 +1,7 @@
 //! The C ABI that `include/frazil.h` declares. A thin layer: arguments are checked and converted to the library's types, results are
 //! converted back; nothing is computed here.
 //!
-//! One file for each kind of object. Raw pointers are followed in `ffi/views.rs` and `ffi/handle.rs` only; every function runs inside
+//! One file for each kind of object. Arrays, structs and handles of a host are read and written in `ffi/`; every function runs inside
 //! `ffi::guard::guard`. cbindgen copies the comments of this folder into the header; `float[3]` is not a link.
 //!
 //! # Safety

@@ -129,7 +129,7 @@ impl<'a> Reader<'a> {
     /// # Errors
     /// Something is left.
     pub fn end(&self) -> Result<()> {
-        require(self.0.is_empty(), "has bytes behind its end")
+        require(self.0.is_empty(), "has bytes after its end")
     }
 }
 

@@ -28,15 +28,15 @@ pub fn check_within(name: &str, value: f64, unit: &str, range: RangeInclusive<f6
 /// `Argument`: it is not.
 pub fn check_not_negative(name: &str, value: f64) -> Result<()> {
     let holds = value >= 0.0 && value.is_finite();
-    ensure(holds, format_args!("{name} = {value} is not finite and 0 or more"))
+    ensure(holds, format_args!("{name} = {value} is negative or not finite"))
 }
 
-/// Checks that there are as many items (`what`) as `others` (`of`).
+/// Checks that the `count` of `what` equals `others`, the count of `of`.
 ///
 /// # Errors
 /// `Argument`: the counts differ.
 pub fn check_each(count: usize, what: &str, others: usize, of: &str) -> Result<()> {
-    ensure(count == others, format_args!("{count} {what} are not one for each of {others} {of}"))
+    ensure(count == others, format_args!("{count} {what} for {others} {of}: one each is needed"))
 }
 
 /// As [`check_each`], for the length of a caller's output array.
@@ -44,5 +44,5 @@ pub fn check_each(count: usize, what: &str, others: usize, of: &str) -> Result<(
 /// # Errors
 /// `Argument`: the counts differ.
 pub fn check_room(room: usize, what: &str, others: usize, of: &str) -> Result<()> {
-    ensure(room == others, format_args!("room for {room} {what} is not that of {others} {of}"))
+    ensure(room == others, format_args!("there is room for {room} {what}, but there are {others} {of}"))
 }

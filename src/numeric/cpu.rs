@@ -51,8 +51,8 @@ fn detect() -> CpuLevel {
     CpuLevel::Baseline
 }
 
-/// Calls the copy of a function that is compiled for the instruction set in use. `at most avx2` makes no AVX-512 copy, where wider vectors
-/// do not pay. The function may be a type's (`Rows::run`) and have generic arguments (`solve::<true>`).
+/// Calls the copy of a function that is compiled for the instruction set in use. `at most avx2` makes no AVX-512 copy, for functions that
+/// wider vectors do not make faster. The function may be a type's (`Rows::run`) and have generic arguments (`solve::<true>`).
 macro_rules! dispatch {
     (at most avx2: $body:ident $(::$path:ident)* $(::<$($generic:tt),+>)?
         ($($name:ident: $kind:ty),*) $(-> $out:ty)?) => {{

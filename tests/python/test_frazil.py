@@ -719,12 +719,12 @@ class Shallow(unittest.TestCase):
             blood.set_bodies([frazil.Capsule((0.02 - frame * 1e-4, 0, 0), (0.02, 0.1, 0), 0.004),
                               frazil.Box((-0.02, 0, 0), (0.004, 0.004, 0.004))])
             blood.step(1 / 60, budget=1)
-        with self.assertRaisesRegex(frazil.Error, "has found no minimum heights"):
+        with self.assertRaisesRegex(frazil.Error, "frz_shallow_find_lifts was not called"):
             blood.surface(lifted=True)
         fitted = blood.find_lifts()
         self.assertTrue(fitted.upward > 100 and fitted.discarded < fitted.upward)
         self.assertEqual(len(blood.surface(lifted=True).positions), len(blood.surface().positions))
-        with self.assertRaisesRegex(frazil.Error, "has found no ledges"):
+        with self.assertRaisesRegex(frazil.Error, "frz_shallow_find_ledges was not called"):
             blood.surface(skirted=True)
         most = blood.find_ledges()
         plain, skirted = blood.surface(), blood.surface(skirted=True)
@@ -805,9 +805,9 @@ class Shallow(unittest.TestCase):
         np.testing.assert_array_equal(snapshot.surface(other).scalars[0], surface.scalars[0])
         for make, text in (
             (lambda: milk.set_poured((1,)), "1 elements, but there are 2 scalars"), (lambda: milk.set_poured((2, 0)), "a concentration of 2"),
-            (lambda: milk.concentrations(2), "scalar = 2 is none of the 2"), (lambda: milk.set_scalars([frazil.Scalar("")]), "name is empty"),
+            (lambda: milk.concentrations(2), "scalar = 2 is out of range: 2 are set"), (lambda: milk.set_scalars([frazil.Scalar("")]), "name is empty"),
             (lambda: milk.set_params(falls_most=3), "falls cannot change"), (lambda: milk.find_lifts(), "was not made with a mesh"),
-            (lambda: milk.surface(lifted=True), "has found no minimum heights"),
+            (lambda: milk.surface(lifted=True), "frz_shallow_find_lifts was not called"),
         ):
             with self.assertRaisesRegex(frazil.Error, text):
                 make()

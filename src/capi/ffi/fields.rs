@@ -29,7 +29,7 @@ macro_rules! sized32 {
 pub(in crate::capi) use sized32;
 
 /// Converts a struct of the library to one of the interface: copies the named fields, cast to the interface's types; all others are 0. With
-/// `<=>` also the other way: `over` replaces these fields of the library's own struct.
+/// `<=>` also converts back: `over` replaces these fields of the library's own struct.
 macro_rules! fields_of {
     ($own:ident <=> $host:ident { $($field:ident),+ }) => {
         fields_of!($own => $host { $($field),+ });

@@ -46,7 +46,7 @@ pub(in crate::capi) unsafe fn read_list<T: Sized32, U>(
     Ok(())
 }
 
-/// The size (bytes) of each struct in a host's array; 0 if there are none. `first` adds to a failure that it is that of the first struct.
+/// The size (bytes) of each struct in a host's array; 0 if there are none. `first` adds to a failure that the first struct caused it.
 ///
 /// # Safety
 /// `list` must be NULL or point to `count` structs.
@@ -128,6 +128,6 @@ pub(in crate::capi) unsafe fn numbers<const N: usize>(first: *const f64, name: &
 
 /// Checks an index of one of the `count` things that a host has set; `name` is that of the argument.
 pub(in crate::capi) fn check_index(name: &str, index: usize, count: usize) -> Outcome<usize> {
-    refuse(index >= count, || format!("{name} = {index} is none of the {count} that were set"))?;
+    refuse(index >= count, || format!("{name} = {index} is out of range: {count} are set"))?;
     Ok(index)
 }

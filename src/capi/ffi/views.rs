@@ -1,4 +1,4 @@
-//! Arrays and structs that cross the boundary: the only code that follows a host's array and struct pointers.
+//! Arrays and structs that cross the boundary: a host's pointers to them are checked and followed here.
 
 use std::ffi::{CStr, c_char, c_void};
 use std::ops::RangeInclusive;
@@ -65,7 +65,7 @@ fn stride<T>(name: &str, data: *const c_void, count: usize, stride: usize) -> Ou
     })?;
     let span = (count.max(1) - 1).checked_mul(stride).and_then(|bytes| bytes.checked_add(size));
     refuse(span.is_none_or(|span| span > MAX_SPAN || (data as usize).checked_add(span).is_none()), || {
-        format!("{name}: {count} elements of {stride} bytes are more than a memory holds")
+        format!("{name}: {count} elements of {stride} bytes exceed the address space")
     })?;
     refuse(data.is_null() && count > 0, || format!("{name}: the data is NULL, but the count is {count}"))?;
     Ok(stride)

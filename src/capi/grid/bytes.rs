@@ -45,7 +45,7 @@ fn options(compression: u32, flags: u32) -> Outcome<WriteOptions> {
 unsafe fn read_grids<'a>(grids: *const *const frz_grid, count: usize) -> Outcome<Vec<Reading<'a, Grid>>> {
     // SAFETY: guaranteed by the caller.
     let grids = unsafe { read_each(grids, count, "grids") }?;
-    refuse(grids.is_empty(), || "grids: there is none")?;
+    refuse(grids.is_empty(), || "grids: the list is empty")?;
     let mut names: Vec<String> = grids.iter().map(|grid| grid.any().name()).collect();
     names.sort_unstable();
     if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {

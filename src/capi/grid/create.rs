@@ -19,7 +19,7 @@ use crate::vdb::{AnyGrid, FloatGrid, GridClass, VectorEdit, VectorGrid, Vectors}
 pub struct frz_grid_desc {
     /// sizeof(frz_grid_desc).
     pub struct_size: u32,
-    /// A frz_grid_class. A level set takes the sign of its band everywhere outside the leaves. For vectors FRZ_GRID_UNKNOWN or
+    /// A frz_grid_class. Outside its leaves a level set has the sign of the adjacent part of its band. For vectors FRZ_GRID_UNKNOWN or
     /// FRZ_GRID_STAGGERED.
     pub grid_class: u32,
     /// Edge of a voxel (m), 1e-6 to 1000.
@@ -39,7 +39,7 @@ pub struct frz_grid_desc {
     pub value_type: u32,
     /// For vectors the value where nothing is stored, finite; else zeroes.
     pub background_vector: [f32; 3],
-    /// Leaves of a grid of vectors, as leaves, which must then be NULL; else NULL.
+    /// Leaves of a grid of vectors, under the same rules as leaves, which must then be NULL; for floats NULL.
     pub vector_leaves: *const frz_vector_leaf,
 }
 
@@ -123,9 +123,9 @@ unsafe fn float_grid(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> O
     finite("background", f64::from(desc.background))?;
     let half_width = f64::from(desc.background) / desc.voxel_size;
     refuse(class == GridClass::LevelSet && !(2.999..=64.001).contains(&half_width), || {
-        format!("background: the band is {half_width:.2} voxels wide, not 3 to 64")
+        format!("background: the half width of the band is {half_width:.2} voxels, not 3 to 64")
     })?;
-    refuse(class == GridClass::Staggered, || "grid_class: floats are not staggered, vectors are")?;
+    refuse(class == GridClass::Staggered, || "grid_class: only vectors can be staggered")?;
     ctx.allow("a grid", (desc.leaf_count as u64).saturating_mul((VOXELS * 8 + 64) as u64))?;
     // SAFETY: guaranteed by the caller.
     let edits = unsafe { float_edits(desc, class) }?;

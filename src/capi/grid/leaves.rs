@@ -134,7 +134,7 @@ pub unsafe extern "C" fn frz_grid_probe(
 
 /// Lends the leaves of a grid of vectors without copying them, in an order that changes only when the grid changes.
 ///
-/// Blocks without a leaf have a single value: the background, or that of frz_grid_vector_probe.
+/// Blocks without a leaf have a single value, which frz_grid_vector_probe reports.
 ///
 /// dst: room for leaf_count elements of frz_vector_leaf; with data NULL only the count is reported. FRZ_ERROR_CAPACITY if it is too small.
 ///     The pointers in it belong to the grid: they are valid until it is destroyed.

@@ -159,7 +159,7 @@ pub unsafe extern "C" fn frz_grid_sample_mesh(
             Some(name) => name.to_string(),
             None => held.any().name(),
         };
-        refuse(name.is_empty(), || "name: neither it nor the grid has one")?;
+        refuse(name.is_empty(), || "name: none is given, and the grid has none")?;
         let positions: Vec<DVec3> = mesh.triangles.positions.iter().map(|p| p.cast()).collect();
         let (components, values) = match held.any() {
             GridRef::Floats(grid) => (1, sampled(ctx, grid, &positions, sampling)?),

@@ -30,8 +30,8 @@ pub struct frz_body {
     pub positions: frz_view,
     /// float[3] for each vertex (m), finite: its position at the end of the step. data NULL: the body does not move.
     pub positions_end: frz_view,
-    /// Poses at equal intervals between the two, each float[3] for each vertex; vertices move straight from pose to pose. NULL for none, as
-    /// it must be without positions_end.
+    /// Poses at equal intervals between positions and positions_end, each float[3] for each vertex; vertices move straight from pose to
+    /// pose. NULL for none, as it must be without positions_end.
     pub between: *const frz_view,
     /// Number of poses in between.
     pub between_count: usize,
@@ -40,13 +40,13 @@ pub struct frz_body {
     /// As in frz_mesh_desc. Where open meshes press into snow or are swept they are closed, with a warning.
     pub indices: frz_view,
     /// Friction of grains against it, 0 to 10; only grains use it. It holds them, and carries them along while the body moves; loose grains
-    /// that slide over a body at rest are subject to the friction between grains instead. 0.3 for headers of interface 1.1 and from
-    /// frz_body_init.
+    /// that slide over a body at rest are subject to the friction between grains instead. frz_body_init sets 0.3, which also applies to
+    /// headers of interface 1.1, without this field.
     pub friction: f64,
     /// Adhesion to grains that touch it (weights of a grain), 0 to 1000; only grains use it.
     pub stick: f64,
-    /// Replaces frz_grains_params.compression, 0 to 1; only with FRZ_BODY_COMPRESSION, and only grains use it. Where several bodies with
-    /// different values removed the snow, the value of the body whose surface came nearest to the position applies.
+    /// Replaces frz_grains_params.compression, 0 to 1; only with FRZ_BODY_COMPRESSION, and only grains use it. Where bodies with different
+    /// values have removed snow, the body whose surface came nearest to a position decides there.
     pub compression: f64,
 }
 
@@ -55,7 +55,7 @@ sized32!(frz_body, [friction], Self { friction: 0.3, ..Self::zeroed() });
 /// Flag of a body: its imprints have no noise.
 pub const FRZ_BODY_EXACT: u32 = 1;
 
-/// Flag of a body: frz_body.compression is the share of the snow it removes that becomes no grains.
+/// Flag of a body: frz_body.compression replaces frz_grains_params.compression for the snow that the body removes.
 pub const FRZ_BODY_COMPRESSION: u32 = 2;
 
 /// Fills a body with the defaults: no arrays, a friction of 0.3.

@@ -46,7 +46,7 @@ pub enum frz_scheme {
     FRZ_SCHEME_WENO5 = 1,
 }
 
-/// Irregularity of a surface: where the noise is positive it moves outward.
+/// Irregularity of a surface, which moves outward where the noise is positive.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_noise {
@@ -295,7 +295,7 @@ fn grown_bytes(grid: &FloatGrid, voxels: f64) -> u64 {
 ///
 /// inout: owned by the caller; unchanged after a failure.
 /// smoothing: a frz_smoothing.
-/// width: means are over cubes of 2 width + 1 voxels, 1 to 32.
+/// width: 1 to 32; means are taken over cubes with an edge of 2 width + 1 voxels.
 /// times: number of passes, 1 to 1000.
 /// scheme: a frz_scheme.
 ///
@@ -344,7 +344,7 @@ pub unsafe extern "C" fn frz_levelset_displace(
         changes(context, inout, |ctx, grid| {
             refuse(
                 !grid.is_world_fixed(),
-                || "the grid's voxels are rotated or shifted against the world's axes",
+                || "the grid's voxels are rotated or shifted relative to the world's axes",
             )?;
             let noise = required(noise.cast_mut(), "noise")?.read_unaligned();
             let Some(params) = noise.params(grid.voxel_size())? else { return Ok(()) };
@@ -360,7 +360,7 @@ pub unsafe extern "C" fn frz_levelset_displace(
 /// It is exact to 0.02 voxel: no dents between poses, no ripples.
 ///
 /// bodies: count bodies, at least one. A vertex farther than 131064 voxels from the first vertex of the first body is out of reach:
-///     FRZ_ERROR_ARGUMENT names its body, counted from 0.
+///     FRZ_ERROR_ARGUMENT names the index of its body.
 /// dt: length of the step (s); 0: the bodies at their positions at its beginning.
 /// voxel_size: edge of a voxel (m), 1e-6 to 1000.
 /// half_width: half width of the band of distances (voxels), 3 to 64.

@@ -64,15 +64,16 @@ impl From<RepairReport> for frz_repair_report {
 /// Creates a closed mesh from one that is open, intersects itself, or is inside out in parts: the solid of all points that lie inside at
 /// least one part, with each part turned outward. Overlapping parts are united, holes are closed, cavities are filled.
 ///
-/// The mesh is rebuilt in the cells of a grid where it has faults, and within a cell of that solid; all other triangles are kept unchanged.
-/// Remaining vertices keep their order and their attributes; new ones take the attributes that the mesh had at the nearest position. All
-/// faces of the result are triangles, each edge has two consistently oriented ones, and the triangles around each vertex form a single
-/// ring.
+/// Where the mesh has faults it is rebuilt in the cells of a grid, within a cell of that solid's surface; all other triangles are kept
+/// unchanged. Remaining vertices keep their order and their attributes; new ones take the attributes that the mesh had at the nearest
+/// position. All faces of the result are triangles, each edge belongs to two consistently oriented triangles, and the triangles around each
+/// vertex form a single ring.
 ///
 /// mesh: not modified.
 /// cell: edge of a cell (m), 1e-9 to 1e6, about as long as the mesh's edges: where the mesh is rebuilt, thinner features may be lost.
 ///     FRZ_ERROR_ARGUMENT if the mesh reaches farther than 131072 cells from its middle, encloses nothing, or would be lost almost
-///     entirely. Smaller losses cause a warning: half of the volume, or a twentieth of its extent and two cells.
+///     entirely. Smaller losses cause a warning: of more than half of the volume, or of an extent of more than two cells and more than a
+///     twentieth.
 /// out: receives the new mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
 /// report: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
 ///

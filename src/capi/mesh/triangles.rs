@@ -361,7 +361,7 @@ pub unsafe extern "C" fn frz_mesh_read(mesh: *const frz_mesh, part: u32, dst: fr
 /// Copies an attribute of a mesh into the caller's memory.
 ///
 /// name: its name. FRZ_ERROR_ARGUMENT, with a list of the existing names, if there is none of this name.
-/// dst: room for one element of that many floats for each vertex; with data NULL only components is reported.
+/// dst: room for one element for each vertex, of as many floats as components reports; with data NULL only components is reported.
 /// components: receives the number of floats for each vertex, 1 to 4; 0 after a failure. May be NULL.
 ///
 /// Any number of threads may read a mesh.

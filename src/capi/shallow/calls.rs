@@ -1,4 +1,4 @@
-//! Bodies that real-time calls share: they change an object, or report numbers.
+//! Function bodies that real-time calls share: they change an object, or report numbers.
 
 use crate::capi::ffi::*;
 use crate::capi::runtime::context::{enter_light, frz_context};

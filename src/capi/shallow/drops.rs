@@ -23,9 +23,9 @@ pub struct frz_shallow_drop {
     pub volume: f64,
     /// Radius of a sphere of its volume (m).
     pub radius: f64,
-    /// Time since it left the edge that it falls from (s).
+    /// Time since it left the edge that it fell from (s).
     pub age: f64,
-    /// Id of that edge: the same for all drops from one side of one column.
+    /// Id of the edge that it fell from: the same for all drops from one side of one column.
     pub source: u64,
     /// Sequence number at its edge: one more than that of the previous drop, if nothing interrupted the flow there.
     pub number: u64,

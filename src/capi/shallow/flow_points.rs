@@ -48,8 +48,7 @@ pub struct frz_shallow_flow {
     pub shares: [f64; 3],
     /// Without FRZ_SHALLOW_ON_TRIANGLE: the position (m). It acts on the nearest ground above or below it.
     pub at: [f64; 3],
-    /// It acts on cells whose centres lie within this distance of the position, seen from above (m), 0 or more; on the nearest cell if
-    /// there are none.
+    /// Radius (m), 0 or more: the point acts on cells whose centres lie within it, seen from above; on the nearest cell if there are none.
     pub radius: f64,
     /// Volume per second (m3/s), 0 or more: 1 ml/s is 1e-6. For an orifice the maximum.
     pub rate: f64,

@@ -54,7 +54,7 @@ impl Terrain {
         Ok((Self::Mesh(moving), solids))
     }
 
-    /// The ground of a height for each cell (m), and its solids.
+    /// The ground of a height field, which has a height (m) for each cell, and its solids.
     pub(in crate::capi) fn of_heights(
         tops: impl ExactSizeIterator<Item = f32>,
         grid: Grid,
@@ -106,7 +106,9 @@ impl Terrain {
         let own = mesh.host_triangles.as_ref().unwrap_or(&mesh.triangles);
         let Some(corners) = own.get(*triangle as usize) else {
             let count = own.len();
-            return Err(Failure::argument(format!("triangle = {triangle} is none of the mesh's {count}")));
+            return Err(Failure::argument(format!(
+                "triangle = {triangle} is out of range: the mesh has {count}"
+            )));
         };
         let corner = |corner: usize| mesh.positions[corners[corner] as usize].cast::<f64>() * shares[corner];
         Ok((corner(0) + corner(1) + corner(2)).into())

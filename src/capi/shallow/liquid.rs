@@ -31,8 +31,8 @@ pub struct frz_shallow_report {
     pub emptied: u64,
     /// Rows of cells, summed over steps, in which columns would have taken more than they had room for, and were limited to what fitted.
     pub filled: u64,
-    /// Rows of cells, summed over steps, in which films on slopes would have been too fast for steps of this length, and were slowed down:
-    /// shorter steps do not limit them.
+    /// Rows of cells, summed over steps, in which films on slopes would have been too fast for steps of this length, and were slowed down;
+    /// with shorter steps they would not be.
     pub slowed: u64,
 }
 

@@ -66,7 +66,7 @@ pub unsafe extern "C" fn frz_shallow_loads(
         let ShallowHandle { shallow, velocities_of_bodies: own, loads: computed, .. } =
             &mut *change(shallow)?;
         let bodies = shallow.bodies().len();
-        refuse(count != bodies, || format!("count = {count} is not that of the {bodies} bodies"))?;
+        refuse(count != bodies, || format!("count = {count}, but there are {bodies} bodies"))?;
         own.clear();
         if velocities.data.is_null() && velocities.count == 0 {
             own.resize(bodies, [0.0; 3]);

@@ -66,11 +66,11 @@ pub enum frz_shallow_section {
 pub enum frz_shallow_friction {
     /// At the ground: accurate where the liquid is far wider than deep.
     FRZ_SHALLOW_GROUND = 0,
-    /// Also at walls and ceilings, and between liquids that flow side by side: ducts and channels carry what theory says. Slower.
+    /// Also at walls and ceilings, and between liquids that flow side by side: flow rates in ducts and channels match theory. Slower.
     FRZ_SHALLOW_WALLS = 1,
 }
 
-/// No scalar, where a scalar may be given.
+/// In place of the index of a scalar: none.
 pub const FRZ_SHALLOW_NO_SCALAR: u32 = 0xFFFF_FFFF;
 
 use frz_liquid::*;
@@ -117,8 +117,8 @@ pub struct frz_shallow_params {
     pub thinning_time: f64,
     /// Power of Carreau's law, 0 to 1; only with a thinning_time.
     pub thinning_power: f64,
-    /// Gravity (m/s2), default (0, -9.81, 0). It may rotate from frame to frame: it points down by 0.001 to 1000, and leans by at most 45
-    /// degrees.
+    /// Gravity (m/s2), default (0, -9.81, 0). Its y is -1000 to -0.001, and neither x nor z exceeds it in magnitude. It may rotate from
+    /// frame to frame.
     pub gravity: [f64; 3],
     /// Share of the flux that is kept in a second, 0 to 1; default 0.5. At 1 only viscosity slows the flow.
     pub kept: f64,
@@ -132,13 +132,13 @@ pub struct frz_shallow_params {
     pub section: u32,
     /// Must be 0.
     pub reserved: u32,
-    /// Height (m) from which liquid falls freely over an edge, 0 or more; default 0.01. Steps lower than the edge of a cell are never
-    /// falls. This and the following falls_ fields apply only if falls_most is over 0, and cannot change.
+    /// Height (m) from which liquid falls freely over an edge, 0 or more; default 0.01. Where the ground drops by less than the edge of a
+    /// cell, liquid never falls freely. This and the following falls_ fields apply only if falls_most is over 0, and cannot change.
     pub falls_height: f64,
     /// Time between the drops that leave one position (s), 0.0001 to 1; default 1/120.
     pub falls_interval: f64,
-    /// Volume of a drop (m3), 0 or more; default 6.5e-11, a sphere of half a millimetre. Where a drop takes longer than 8 intervals to
-    /// fill, liquid drips.
+    /// Volume of a drop (m3), 0 or more; default 6.5e-11, a sphere with a diameter of half a millimetre. Where a drop takes longer than 8
+    /// intervals to fill, liquid drips.
     pub falls_drop: f64,
     /// Maximum number of drops in the air, up to 1048576, for which memory is allocated at the start; 8192 is a good value. Default 0:
     /// nothing falls freely, and liquid that goes over an edge is below at once.
@@ -155,8 +155,8 @@ pub struct frz_shallow_params {
     pub thickening_scalar: u32,
     /// Concentration up to which viscosity is that of the liquid, finite.
     pub thickening_from: f64,
-    /// Concentration from which viscosity is thickening_times that, linear in between; finite, not equal to thickening_from, but it may be
-    /// less.
+    /// Concentration from which viscosity is that of the liquid times thickening_times, and linear in between; finite, more or less than
+    /// thickening_from.
     pub thickening_to: f64,
     /// Factor on viscosity, 1e-6 to 1e9.
     pub thickening_times: f64,

@@ -15,7 +15,7 @@ pub struct frz_shallow_info {
     pub struct_size: u32,
     /// Maximum number of columns above each other in a cell.
     pub layers: u32,
-    /// Number of column indices: 16 for each strip of 16 cells along x that has a column of a layer. Some indices may have no column.
+    /// Number of column indices: 16 for each strip (16 cells along x on one layer) that has a column. Some indices may have no column.
     pub index_count: u64,
     /// Number of columns.
     pub column_count: u64,
@@ -33,10 +33,10 @@ pub struct frz_shallow_info {
 
 sized32!(frz_shallow_info);
 
-/// Layer of a volume: all layers.
+/// In place of a layer in frz_shallow_volume: all layers.
 pub const FRZ_SHALLOW_ALL_LAYERS: u32 = 0xffff_ffff;
 
-/// Column of a sample: there is no column.
+/// In frz_shallow_sample.column: there is no column at the point.
 pub const FRZ_SHALLOW_NO_COLUMN: u32 = 0xffff_ffff;
 
 /// Column arrays that frz_shallow_read copies. An index without a column has the cell (-1, -1), no depth, and a ceiling at its base.
@@ -126,7 +126,7 @@ pub unsafe extern "C" fn frz_shallow_get_info(
 /// Copies an array of columns.
 ///
 /// array: a frz_shallow_array, which states the type of the elements.
-/// columns: uint32_t for each requested column, its index; data NULL with a count of 0: all indices, in order.
+/// columns: uint32_t, the index of each requested column; data NULL with a count of 0: all indices, in order.
 /// dst: room for as many elements; FRZ_ERROR_CAPACITY if it is too small, and nothing is written.
 ///
 /// Any number of threads may read a shallow liquid.
@@ -190,7 +190,9 @@ impl Requested {
             if let Some((at, index)) =
                 indices.clone().enumerate().find(|(_, index)| *index as usize >= *count)
             {
-                let text = format!("columns: element {at}, {index}, is none of the {count} column indices");
+                let text = format!(
+                    "columns: element {at}, {index}, is out of range: there are {count} column indices"
+                );
                 return Err(Failure::argument(text));
             }
             dst.put("dst", indices.map(|index| value(index as usize)))
@@ -312,7 +314,7 @@ pub unsafe extern "C" fn frz_shallow_volume(
                     view.volume(numbers(low, "low")?, numbers(high, "high")?)?
                 }
                 (false, _) => {
-                    return Err(Failure::argument("layer: a box has no layer: give one of the two"));
+                    return Err(Failure::argument("layer: give either a layer or a box, not both"));
                 }
             })
         })

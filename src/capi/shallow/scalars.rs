@@ -19,7 +19,7 @@ const _: () = assert!(FRZ_SHALLOW_MOST_SCALARS as usize == MAX_SCALARS);
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_shallow_law {
-    /// It does not: dye, salt, heat.
+    /// Not at all: dye, salt, heat.
     FRZ_SHALLOW_DYE = 0,
     /// It decays by half in each frz_shallow_scalar.half_life.
     FRZ_SHALLOW_DECAYS = 1,
@@ -29,7 +29,7 @@ pub enum frz_shallow_law {
 
 use frz_shallow_law::*;
 
-/// The laws, which may have a half-life.
+/// The laws; the argument is the half-life, which only [`Law::Decays`] uses.
 const LAWS: Meanings<fn(f64) -> Law, 3> = [
     (FRZ_SHALLOW_DYE as u32, |_| Law::Dye),
     (FRZ_SHALLOW_DECAYS as u32, Law::Decays),
@@ -46,8 +46,8 @@ pub struct frz_shallow_scalar {
     pub law: u32,
     /// Its name in messages, not empty and different from those of the other scalars; it is copied.
     pub name: *const c_char,
-    /// Concentrations are within -range to range, in the scalar's own unit, with a resolution of 2^-20 of it: 1e-9 to 1e9. For a dye 1, for
-    /// an age 3600 (s).
+    /// Bound of the concentrations, 1e-9 to 1e9, in the scalar's own unit: they lie within -range to range, with a resolution of 2^-20 of
+    /// the range. Suitable values are 1 for a dye and 3600 (s) for an age.
     pub range: f64,
     /// Half-life of a scalar that decays: 1e-6 to 1e12 (s); otherwise ignored.
     pub half_life: f64,
@@ -85,10 +85,10 @@ pub(in crate::capi) unsafe fn read_scalars(
     Ok(given)
 }
 
-/// Sets the scalars that the liquid carries, replacing those before. They are 0 everywhere at first, and 0 in what is poured and what comes
-/// through sources until frz_shallow_set_poured and frz_shallow_set_sourced. The next frame may allocate.
+/// Sets the scalars that the liquid carries, replacing the previous ones. They are 0 everywhere at first; poured liquid has 0 until
+/// frz_shallow_set_poured is called, and liquid from sources until frz_shallow_set_sourced is. The next frame may allocate.
 ///
-/// scalars: count scalars; NULL with a count of 0: none. FRZ_ERROR_ARGUMENT names one that is out of range, counted from 0; the old ones
+/// scalars: count scalars; NULL with a count of 0: none. FRZ_ERROR_ARGUMENT names the index of one that is out of range; the old scalars
 ///     are then kept.
 /// count: number of scalars, up to FRZ_SHALLOW_MOST_SCALARS.
 ///
@@ -161,7 +161,7 @@ pub(in crate::capi) unsafe fn with_concentrations(
 /// Copies the concentrations of a scalar (a real-time call: see frz_shallow); 0 where it is dry.
 ///
 /// scalar: its index, from 0.
-/// columns: uint32_t for each requested column, its index; data NULL with a count of 0: all indices, in order.
+/// columns: uint32_t, the index of each requested column; data NULL with a count of 0: all indices, in order.
 /// dst: room for a float for each; FRZ_ERROR_CAPACITY if it is too small, and nothing is written.
 ///
 /// Any number of threads may read a shallow liquid.
@@ -208,11 +208,11 @@ pub struct frz_shallow_scalar_balance {
     pub held: f64,
     /// In the air.
     pub falling: f64,
-    /// Added by its law; negative: taken.
+    /// Added by its law; negative: removed.
     pub grown: f64,
     /// Left by rounding in columns that ran dry.
     pub dried: f64,
-    /// Error of the sum above, in the smallest amounts: 0, as all are integers.
+    /// Error of the balance above, in units of the smallest amount: always 0, since all amounts are integers.
     pub error: i64,
 }
 

@@ -14,8 +14,8 @@ use crate::shallow::Snapshot;
 use crate::shallow::free_fall::mesh::Balls;
 use crate::shallow::surface::{Depths, Surface};
 
-/// A copy of a liquid as it was after a frame: another thread may draw it while the next frame is computed. A host has two: one being
-/// taken, and one being drawn.
+/// A copy of a liquid as it was after a frame: another thread may draw it while the next frame is computed. A host uses two: one is taken
+/// while the other is drawn.
 pub struct frz_shallow_snapshot {
     _opaque: [u8; 0],
 }
@@ -136,7 +136,7 @@ pub unsafe extern "C" fn frz_shallow_snapshot_surface(
 impl SnapshotHandle {
     fn write_surface(&mut self, request: &MeshRequest<frz_shallow_target>) -> Outcome {
         let Self { snapshot, surface, least, sunk, found_ledges, .. } = self;
-        let when = "when the snapshot was taken";
+        let when = "for the ground of this snapshot";
         let known = (!least.is_empty()).then_some((&least[..], &sunk[..]));
         let (least, sunk) = requested_heights(request.has(FRZ_SHALLOW_LIFTED), known, when)?;
         let depths = Depths {

@@ -6,11 +6,11 @@ use super::handle::{ShallowHandle, frz_shallow};
 use crate::capi::ffi::*;
 use crate::shallow::Balance;
 
-/// Sets sources, drains and absorbers, replacing those before; what those have moved remains in frz_shallow_balance. An absorber that is
+/// Sets sources, drains and absorbers, replacing the previous ones; what those moved remains in frz_shallow_balance. An absorber that is
 /// set again is dry. The next frame may allocate.
 ///
-/// flows: count flow points; NULL with a count of 0: none. FRZ_ERROR_ARGUMENT names one that is out of range, or lies inside a solid or
-///     outside the domain, counted from 0; the old ones are then kept.
+/// flows: count flow points; NULL with a count of 0: none. FRZ_ERROR_ARGUMENT names the index of one that is out of range, or lies inside a
+///     solid or outside the domain; the old ones are then kept.
 /// count: number of flow points.
 ///
 /// One thread at a time.
@@ -147,7 +147,8 @@ pub struct frz_shallow_balance {
     pub gained: f64,
     /// Waiting for room, where ground or a body displaced it.
     pub held: f64,
-    /// Error of the sum above, in units (2^-30 of the range of heights, of a cell): 0, as all are integers.
+    /// Error of the balance above, in units of volume (2^-30 of the range of heights, times the area of a cell): always 0, since all
+    /// amounts are integers.
     pub error: i64,
     /// In the air.
     pub falling: f64,

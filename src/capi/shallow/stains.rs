@@ -21,8 +21,8 @@ pub struct frz_shallow_staining {
     pub struct_size: u32,
     /// Must be 0.
     pub flags: u32,
-    /// Index of the scalar that stains (frz_shallow_set_scalars), from 0, by its concentration over its range, clamped to 0 to 1: clear
-    /// liquid washes stains off. Default FRZ_SHALLOW_NO_SCALAR: any liquid stains, fully.
+    /// Index of the scalar that stains (frz_shallow_set_scalars), from 0. A stain approaches its concentration divided by its range,
+    /// clamped to 0 to 1, so that clear liquid washes stains off. Default FRZ_SHALLOW_NO_SCALAR: any liquid stains, fully.
     pub scalar: u32,
     /// Must be 0.
     pub reserved: u32,
@@ -32,7 +32,7 @@ pub struct frz_shallow_staining {
     pub takes: f64,
     /// Time (s) in which half of a stain on dry ground fades, 0.001 or more; infinity: it stays. Default 60.
     pub half_life: f64,
-    /// Maximum that the ground absorbs (m: m3 for each m2 of its mesh), 0 to 1000: gauze some 1e-3. Default 0: nothing.
+    /// Maximum that the ground absorbs (m: m3 for each m2 of its mesh), 0 to 1000; about 1e-3 for gauze. Default 0: nothing.
     pub capacity: f64,
     /// Rate at which dry ground absorbs (m/s), 0 or more; it decreases as the ground fills. Only with a capacity.
     pub rate: f64,
@@ -73,7 +73,7 @@ pub unsafe extern "C" fn frz_shallow_staining_init(
 }
 
 /// Stains on the vertices of a mesh, and the liquid that it has absorbed: they move with ground that deforms. The mesh need not be the one
-/// that the liquid was created with, but it lies where the liquid's ground is.
+/// that the liquid was created with, but must lie on the liquid's ground.
 pub struct frz_shallow_stains {
     _opaque: [u8; 0],
 }
@@ -123,8 +123,8 @@ pub unsafe extern "C" fn frz_shallow_stains_create(
 /// Memory (bytes) of a vertex: its stain, when it was wet, its content and capacity, and its position, twice while it is read.
 const BYTES_PER_VERTEX: u64 = 52;
 
-/// Lets the liquid stain the ground, and the ground absorb liquid, for the time since the last call, once a frame (a real-time call: see
-/// frz_shallow).
+/// Lets the liquid stain the ground, and the ground absorb liquid, for the time since the last call (a real-time call: see frz_shallow).
+/// Call it once a frame.
 ///
 /// shallow: the liquid, after its frame; only ground with a capacity changes it. What it absorbs is part of frz_shallow_balance.absorbed.
 /// positions: float[3] for each vertex (m), finite: the current ones. After a failure all is as it was.

@@ -35,8 +35,9 @@ pub unsafe extern "C" fn frz_shallow_save(
     }
 }
 
-/// Replaces the liquid's state by a saved one (a real-time call: see frz_shallow): from there it flows as the saved one did, to the same
-/// bytes, with the same parameters, flow points and bodies, which must be set before. The volumes moved by flow points are restored too.
+/// Replaces the liquid's state by a saved one (a real-time call: see frz_shallow): the liquid then continues as the saved one did, to the
+/// same bytes, with the same parameters, flow points and bodies, which must be set before. The volumes moved by flow points are restored
+/// too.
 ///
 /// state: bytes bytes of frz_shallow_save. FRZ_ERROR_FILE, with the liquid unchanged, if they are damaged, or of another version, another
 ///     ground or border, or other kinds of flow points.

@@ -167,12 +167,12 @@ impl frz_shallow_body {
     }
 }
 
-/// Sets the solids that move over the ground, replacing those before (a real-time call: see frz_shallow): the ground is rebuilt where one
-/// moves, and no triangle is visited. The liquid is displaced, and none of it is lost. After a failure all is as it was.
+/// Sets the solids that move over the ground, replacing the previous ones (a real-time call: see frz_shallow): the ground is rebuilt where
+/// one moves, and no triangle is visited. The liquid is displaced, and none of it is lost. After a failure all is as it was.
 ///
 /// A body is identified by its index: keep it at the same one from call to call. Bodies that do not move cost nothing.
 ///
-/// bodies: count bodies; NULL with a count of 0: none. FRZ_ERROR_ARGUMENT names one that is out of range, counted from 0.
+/// bodies: count bodies; NULL with a count of 0: none. FRZ_ERROR_ARGUMENT names the index of one that is out of range.
 /// count: number of bodies.
 /// moved: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
 ///

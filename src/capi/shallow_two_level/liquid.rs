@@ -19,7 +19,7 @@ use crate::shallow::two_level::surface::Surface;
 /// the length everywhere else, where a frame takes a quarter of the time. No liquid is lost between them.
 ///
 /// It has no falls and no thickening. frz_shallow_detail_step, _surface, _save and _set_bodies are real-time calls, as frz_shallow defines
-/// it; _set_near, _update_terrain and _update_heights may allocate, and so may _restore if it moves the box.
+/// them; _set_near, _update_terrain and _update_heights may allocate, and so may _restore if it moves the box.
 pub struct frz_shallow_detail {
     _opaque: [u8; 0],
 }
@@ -63,8 +63,8 @@ impl DetailHandle {
 /// params: NULL for the defaults. Without falls and thickening.
 /// domain: where liquid can be. Its numbers of cells are even.
 /// mesh: it is copied.
-/// near: double[4], minimum x, minimum z, maximum x and maximum z (m): the small cells are those of the smallest box of pairs of cells that
-///     contains it, within the domain; all cells may be small. FRZ_ERROR_ARGUMENT if it lies outside.
+/// near: double[4], minimum x, minimum z, maximum x and maximum z (m): the box in which cells are small, enlarged to whole pairs of cells
+///     along x and z, within the domain; all cells may be small. FRZ_ERROR_ARGUMENT if it lies outside the domain.
 /// out: receives the liquid, to be destroyed with frz_shallow_detail_destroy; NULL after a failure.
 ///
 /// Any number of threads may read a mesh; one thread at a time for each context.
@@ -293,8 +293,8 @@ pub unsafe extern "C" fn frz_shallow_detail_fill(detail: *mut frz_shallow_detail
     })
 }
 
-/// Reports where all liquid is, and where it came from. The remainder of each large cell, less than its unit, which is four units of small
-/// cells, is part of held.
+/// Reports where all liquid is, and where it came from. Each large cell has a remainder of less than its unit, which is four units of a
+/// small cell; these remainders are part of held.
 ///
 /// balance: receives it, all zeroes after a failure. Its struct_size is set by the caller.
 ///

@@ -213,7 +213,7 @@ pub unsafe extern "C" fn frz_base_set_params(
 /// Results replace the layer's grids only at the end: after a failure or a cancel the layer is as it was before.
 ///
 /// bodies: count bodies; NULL with a count of 0. What passes farther than 131072 voxels from the middle of the snow is left out. If a body
-///     touches the snow while a vertex of it is that far away, FRZ_ERROR_ARGUMENT names it, counted from 0, and nothing is changed.
+///     touches the snow while one of its vertices is that far away, FRZ_ERROR_ARGUMENT names the body's index, and nothing is changed.
 /// count: number of bodies.
 /// dt: length of the step (s). 0: the bodies are cut out at their positions at its beginning, as the first frame of a shot requires.
 /// frame: the value that frz_base_touched takes where the snow changes, -16777216 to 16777216.
@@ -302,7 +302,7 @@ pub unsafe extern "C" fn frz_base_removed(base: *const frz_base) -> *const frz_g
     lent(base, 1)
 }
 
-/// Lends the compression of the snow: the fraction of its column's height that was removed, 0 to 1, at touched voxels of the surface.
+/// Lends the compression of the snow: at each touched voxel of the surface, the fraction of its column's height that was removed, 0 to 1.
 ///
 /// The layer owns the grid, as that of frz_base_grid.
 ///

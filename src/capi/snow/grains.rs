@@ -36,7 +36,7 @@ pub struct frz_grains_report {
     pub sub_steps: u32,
     /// Grains after the step.
     pub count: u64,
-    /// Those at rest: nothing moves them until something wakes them.
+    /// Grains at rest, which do not move until something wakes them.
     pub resting: u64,
     /// Grains born from removed snow.
     pub born: u64,
@@ -44,7 +44,7 @@ pub struct frz_grains_report {
     pub dropped: u64,
     /// Grains that reached their lifetime.
     pub expired: u64,
-    /// Grains that are pressed where there is no room for them: the attribute FRZ_GRAINS_TRAPPED.
+    /// Grains whose attribute FRZ_GRAINS_TRAPPED is 1.
     pub trapped: u64,
     /// Snow that the base layer lost (m3).
     pub removed_volume: f64,
@@ -116,7 +116,7 @@ impl GrainsHandle {
         frame: i32,
     ) -> Outcome<frz_grains_report> {
         within("dt", dt, 0.0..=MAX_DT, " s")?;
-        refuse(dt > 0.0 && dt < MIN_DT, || format!("dt = {dt} is not 0, and less than {MIN_DT} s"))?;
+        refuse(dt > 0.0 && dt < MIN_DT, || format!("dt = {dt} s is neither 0 nor at least {MIN_DT} s"))?;
         if let Some(snow) = base.after() {
             check_size(self.grains.params().radius, snow.voxel_size())?;
         }
@@ -153,7 +153,7 @@ fn check_size(radius: f64, voxel: f64) -> Outcome {
         let [radius, voxel] = [radius, voxel].map(digits::given);
         let [low, high] = [low, high].map(digits::bound);
         let text = format!(
-            "radius = {radius} is not within {low} to {high} m, as the base layer's voxels of {voxel} m want it"
+            "radius = {radius} is not within {low} to {high} m, as the base layer's voxels of {voxel} m require"
         );
         return Err(Failure::argument(text));
     }
@@ -164,7 +164,7 @@ fn check_size(radius: f64, voxel: f64) -> Outcome {
 pub(in crate::capi) fn check_snow(name: &str, grid: &FloatGrid) -> Outcome {
     refuse(grid.class() != GridClass::LevelSet, || format!("{name}: the grid is not a level set"))?;
     refuse(!grid.is_world_fixed(), || {
-        format!("{name}: the grid is rotated or shifted against the world's axes")
+        format!("{name}: the grid is rotated or shifted relative to the world's axes")
     })
 }
 

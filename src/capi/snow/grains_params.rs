@@ -14,13 +14,13 @@ pub struct frz_grains_params {
     pub struct_size: u32,
     /// 0, or any of FRZ_GRAINS_FLOOR, FRZ_GRAINS_RESTLESS, FRZ_GRAINS_BOX and FRZ_GRAINS_AIR_BY_DENSITY.
     pub flags: u32,
-    /// Radius of a grain (m), 1e-5 to 1; with a base layer 0.02 to 0.5 of its voxel. A third of the voxel gives the thesis' look; default:
-    /// that for voxels of 1 cm.
+    /// Radius of a grain (m), 1e-5 to 1; with a base layer 0.02 to 0.5 of its voxel. A third of the voxel gives the look of the thesis;
+    /// default 0.01 / 3, for voxels of 1 cm.
     pub radius: f64,
     /// Share of the removed snow that is compressed and becomes no grains, 0 to 1; default 0.75.
     pub compression: f64,
-    /// Friction between grains, 0 to 1; default 0.14. As grains do not rotate, 0.14 already holds a slope of 32 degrees; with attraction
-    /// 0.26 does. On the base layer they rest up to the same slope.
+    /// Friction between grains, 0 to 1; default 0.14. As grains do not rotate, a friction of 0.14 already holds a slope of 32 degrees;
+    /// grains that attract each other need 0.26. Grains rest on the base layer up to the same slope.
     pub friction: f64,
     /// Force with which grains that almost touch hold each other (weights of a grain), 0 to 1000; default 0.
     pub attraction: f64,
@@ -38,9 +38,9 @@ pub struct frz_grains_params {
     pub keep_low: [f64; 3],
     /// Its maximum corner (m); default 0.
     pub keep_high: [f64; 3],
-    /// Seconds after which a grain is removed, counted by the frames of its birth and of the step; default 0: never.
+    /// Age (s) at which a grain is removed: the frame number of the step minus that of its birth, times dt. Default 0: never.
     pub lifetime: f64,
-    /// Maximum number of grains, 1 to 60000000: a step or an emission that would exceed it fails. Default 20000000.
+    /// Maximum number of grains, 1 to 60000000: a step or frz_grains_emit fails if it would exceed this. Default 20000000.
     pub max_grains: u64,
     /// Seed of the scatter of grains in removed snow; default 0.
     pub seed: u64,
@@ -67,7 +67,7 @@ pub const FRZ_GRAINS_RESTLESS: u32 = 2;
 /// Flag of frz_grains_params: grains outside the box from frz_grains_params.keep_low to keep_high are removed.
 pub const FRZ_GRAINS_BOX: u32 = 4;
 
-/// Flag of frz_grains_params: grains among others feel less of the air than those of a thin spray.
+/// Flag of frz_grains_params: the air slows grains with many neighbours less than those of a thin spray.
 pub const FRZ_GRAINS_AIR_BY_DENSITY: u32 = 8;
 
 fields_of!(Params <=> frz_grains_params {
@@ -131,7 +131,8 @@ pub unsafe extern "C" fn frz_grains_params_init(params: *mut frz_grains_params, 
 ///
 /// params: friction and attraction are set, for grains of its radius.
 /// repose_angle_deg: slope at which a poured pile comes to rest (degrees), 0 to 42.
-/// stands: height of a wall of grains that just stands (m), 0 to 1000; measured up to 64 diameters. 0: no attraction.
+/// stands: height of a wall of grains that just stands (m), 0 to 1000. 0: no attraction. The conversion to attraction was measured only for
+///     walls of up to 64 diameters.
 ///
 /// Any thread.
 #[unsafe(no_mangle)]

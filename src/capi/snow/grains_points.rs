@@ -9,7 +9,7 @@ use crate::capi::runtime::context::{enter, frz_context};
 use crate::geometry::DVec3;
 use crate::snow::grains::{Grains, memory};
 
-/// Attributes that frz_grains_read copies; the customary attribute name is in brackets.
+/// Attributes of each grain that frz_grains_read copies; the customary attribute name is in brackets.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_grains_attribute {
@@ -29,7 +29,7 @@ pub enum frz_grains_attribute {
     FRZ_GRAINS_REST = 6,
     /// int32_t: 1 if it is awake, 0 if it rests (active).
     FRZ_GRAINS_ACTIVE = 7,
-    /// int32_t: 1 if it is trapped: a surface that it is in and those around it leave it no room (trapped).
+    /// int32_t: 1 if it is trapped: inside a surface, with no room outside all surfaces nearby (trapped).
     FRZ_GRAINS_TRAPPED = 8,
 }
 
@@ -49,7 +49,7 @@ const ATTRIBUTES: Meanings<frz_grains_attribute, 9> = numbered! {
 /// first: receives the id of the first new grain; the others follow in the order of the positions. -1 if there are none, 0 after a failure;
 ///     may be NULL.
 ///
-/// After a failure no grain was added; the error names the first element at fault, counted from 0. One thread at a time.
+/// After a failure no grain was added; the error names the index of the first element at fault. One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_grains_emit(
     context: *mut frz_context,

@@ -39,7 +39,7 @@ pub struct frz_mist_report {
     pub iterations: u64,
     /// Sum of the density times the volume of a cell (m3).
     pub mass: f64,
-    /// Maximum divergence left by a projection, times the cell, over the maximum speed before it.
+    /// Maximum divergence left by a projection, times the cell, divided by the maximum speed before the projection.
     pub divergence: f64,
     /// Maximum speed of the air along any axis (m/s).
     pub fastest: f64,
@@ -189,8 +189,8 @@ pub unsafe extern "C" fn frz_mist_set_params(
 ///
 /// grains: the grains after their step; they are only read. NULL: none raise mist.
 /// base: the layer after its step, around which the air flows; it is only read. NULL: there is none.
-/// wind: a grid of velocities (m/s) towards which the air moves where there is mist, by half of the difference in a tenth of a second; a
-///     component that is not within 1000 m/s of 0 where there is air is FRZ_ERROR_ARGUMENT. NULL: only frz_mist_params.wind.
+/// wind: a grid of velocities (m/s) that the air approaches where there is mist: half of the difference is gone after a tenth of a second.
+///     A component beyond 1000 m/s where there is air is FRZ_ERROR_ARGUMENT. NULL: only frz_mist_params.wind.
 /// bodies: count bodies that bound the air and carry it along; NULL with a count of 0. Bodies that do not move have no positions_end. If
 ///     the openings of a body exceed a tenth of its area, air flows around both of its sides. A body with a vertex that moves faster than
 ///     100 m/s is treated as jumping: it stands at positions_end for the whole step.

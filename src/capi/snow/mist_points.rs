@@ -12,13 +12,13 @@ use crate::snow::mist::{Source, Start};
 /// its own, or only their files.
 ///
 /// Each point is assumed to have moved at its final velocity for all of dt, even if it was hit or born during the step: where points begin
-/// to fly this raises more mist, the more the longer the steps. A host that knows where points were calls frz_mist_step_paths.
+/// to fly this raises too much mist, and more with longer steps. A host that knows where points were should call frz_mist_step_paths.
 ///
 /// positions: double[3] for each point at the step's end (m), finite, within 1e7 cells of the origin along each axis.
 /// velocities: float[3] for each point (m/s), finite.
 /// radius: of the points (m), above 0 and at most 64 cells.
-/// snow: a level set around which the air flows, with voxels fixed in world space, before the layer's step, in which bodies move into it.
-///     NULL: there is none.
+/// snow: the snow around which the air flows, as it was before the layer's step, in which bodies press into it: a level set with voxels
+///     fixed in world space. NULL: there is none.
 /// wind: as for frz_mist_step.
 /// bodies: as for frz_mist_step.
 /// count: as for frz_mist_step.

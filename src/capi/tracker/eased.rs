@@ -19,7 +19,7 @@ const MAX_AHEAD: usize = 100;
 /// now: the particles at the end of the last step, or those that the tracker was created with.
 /// coming: count pointers to the particles of the coming frames, in order, each dt after the previous one; NULL if count is 0.
 /// count: 0 to ahead; less than ahead where the shot ends.
-/// ahead: number of steps before a change in which vertices start to move, 1 to 100; 4 is a good value. The same in all frames.
+/// ahead: number of steps before a change in which vertices start to move, 1 to 100; 4 is a good value. Pass the same number in all frames.
 /// dt: time between frames (s), above 0.
 /// dst: room for as many double[3] as frz_tracker_count reports (m); FRZ_ERROR_CAPACITY if it is too small, and nothing is written.
 ///

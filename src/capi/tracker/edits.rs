@@ -119,7 +119,7 @@ pub enum frz_edit_array {
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_edit_kind {
-    /// It existed before, with the same vertices in the same order of rotation.
+    /// It existed before, with the same vertices in the same cyclic order.
     FRZ_EDIT_WHOLE = 0,
     /// A part of a triangle that existed before and was cut or divided.
     FRZ_EDIT_PART = 1,

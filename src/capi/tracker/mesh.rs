@@ -52,7 +52,7 @@ pub struct frz_tracker_report {
     pub triangles: u64,
     /// Parts of that surface that the mesh does not cover: drops outside it.
     pub drops: u64,
-    /// Likewise, bubbles inside it.
+    /// Parts of that surface inside the mesh that the mesh lacks: bubbles.
     pub bubbles: u64,
     /// Vertices next to surface that the mesh does not cover: the liquid begins to merge or to split there. They are flagged.
     pub uncovered: u64,
@@ -210,7 +210,8 @@ pub unsafe extern "C" fn frz_particles_spacing(
 /// params: see frz_tracker_params.
 /// mesh: the mesh at the first frame, in the particles' space; also with a restart. It is copied. It may be open, intersect itself and
 ///     repeat vertices; with params.rebuild it must be closed, each edge with two consistently oriented triangles, and the triangles around
-///     each vertex a single ring: see frz_mesh_repair. FRZ_ERROR_ARGUMENT says where it is not, or that it is not where the particles are.
+///     each vertex a single ring: see frz_mesh_repair. The message of FRZ_ERROR_ARGUMENT says where it is not, or that mesh and particles
+///     lie apart.
 /// particles: those of the first frame; NULL with a restart.
 /// restart: restart_bytes bytes that frz_tracker_save wrote for a tracker with the same mesh, spacing and cell: it is restored bit for bit,
 ///     on any number of threads. NULL: none. FRZ_ERROR_FILE if they are damaged, or of another version, mesh, spacing or cell.
@@ -268,7 +269,7 @@ pub unsafe extern "C" fn frz_tracker_set_params(
 }
 
 /// Prefetches the particles of the step after the next: with frz_tracker_params.rebuild their surface is computed on idle threads while the
-/// next step rebuilds the mesh. The result is identical; if other particles then come, time was wasted. Of no use with
+/// next step rebuilds the mesh. The result is identical; if that step then gets other particles, the work was wasted. Unnecessary with
 /// frz_tracker_read_eased, which computes the coming steps itself.
 ///
 /// particles: those of that step; they are copied.

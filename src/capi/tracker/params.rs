@@ -54,8 +54,8 @@ pub struct frz_tracker_params {
     /// float, is 1, detail never fades; where it is 0, it fades at this rate. A new vertex takes the mean of this attribute over those of
     /// its neighbours that existed before, 0 without any.
     pub half_life: f64,
-    /// How much detail fades where the mesh is strained: to exp(-fade) of itself while lengths change by a factor of e, 0 to 1000; default
-    /// 0: not at all.
+    /// How much detail fades where the mesh is strained, 0 to 1000: a change of lengths by a factor of e leaves exp(-fade) of the detail.
+    /// Default 0: it does not fade.
     pub fade: f64,
     /// A frz_tracker_weighting; default FRZ_TRACKER_AFFINE.
     pub weighting: u32,

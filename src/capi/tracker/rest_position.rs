@@ -7,9 +7,9 @@ use crate::capi::runtime::context::{enter, frz_context};
 use crate::surface::Rest;
 
 /// Copies for each vertex where the liquid there was at the first frame, according to the nearby particles that already existed then. With
-/// it a host carries its own textures and arrays through merges and splits: vertices that a step made (frz_tracker_read_edits) take what
-/// the mesh of the first frame has at the position nearest to where their liquid was. The corners of a triangle may come from far apart
-/// where liquids have merged: all of them should then take their values from near one of them.
+/// it a host carries its own textures and arrays through merges and splits: new vertices (frz_tracker_read_edits) take what the mesh of the
+/// first frame has nearest to these positions. The corners of a triangle may come from far apart where liquids have merged: all of them
+/// should then take their values from near one of them.
 ///
 /// first: the particles at the first frame, with ids.
 /// now: the particles at the end of the last step, with ids.

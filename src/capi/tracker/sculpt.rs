@@ -8,15 +8,15 @@ use crate::capi::runtime::context::{enter, frz_context};
 use crate::mesh_repair::Source;
 use crate::surface::Outlook;
 
-/// Replaces the tracker's mesh by an edited one: an artist's change in the middle of a shot. The distance of each of its vertices from the
-/// particles' surface is measured again, and kept from then on. After a failure or a cancel the tracker is as it was.
+/// Replaces the tracker's mesh by an edited one: an artist's change in the middle of a shot. The distance of each new vertex from the
+/// particles' surface is measured now, and kept from then on. After a failure or a cancel the tracker is as it was.
 ///
-/// The parameters stay. All vertices and triangles count as new: frz_tracker_edits reports 1, and frz_tracker_read_edits reports all as
-/// made; the positions before (FRZ_EDIT_BEFORE) are those to which the last step led. States saved from then on hold the edited mesh, but
-/// are still restored with the mesh that the tracker was created with (frz_tracker_create).
+/// The parameters stay. All vertices and triangles count as new: frz_tracker_edits reports 1, and FRZ_EDIT_BEFORE holds the positions to
+/// which the last step moved the previous vertices. States saved from then on hold the edited mesh, but are still restored with the mesh
+/// that the tracker was created with (frz_tracker_create).
 ///
 /// mesh: as for frz_tracker_create, with any vertices and faces, in the particles' space; it is copied. Its attribute "detail", of one
-///     float, says what does not fade, even if the previous mesh had none.
+///     float, says where detail does not fade, even if the previous mesh had no such attribute.
 /// particles: those at the end of the last step, or those that the tracker was created with: the next step begins with them.
 ///
 /// One thread at a time; any number may read a mesh.

@@ -119,7 +119,10 @@ impl BaseLayer {
     fn with_volume(ctx: &Context, surface: FloatGrid, params: Params, known: Option<f64>) -> Result<Self> {
         params.validate(&surface)?;
         ensure(surface.class() == GridClass::LevelSet, "the snow is not a level set")?;
-        ensure(surface.is_world_fixed(), "the snow's grid is rotated or shifted against the world's axes")?;
+        ensure(
+            surface.is_world_fixed(),
+            "the snow's grid is rotated or shifted relative to the world's axes",
+        )?;
         let half_width = half_width(&surface);
         let (low, high) = surface.active_bbox().ok_or_else(|| Error::argument("the snow is empty"))?;
         let (volume, initial) = ctx.phase("measure", || {

@@ -95,7 +95,7 @@ static void flow_points_move_along(frz_context *ctx) {
         CHECK(sample.depth < moved[2]);
     }
     flows[0].triangle = SHEET_TRIANGLES;
-    FAILS(frz_shallow_set_flows(shallow, flows, 2), FRZ_ERROR_ARGUMENT, "flow 0: triangle = 1058 is none of the mesh's 1058");
+    FAILS(frz_shallow_set_flows(shallow, flows, 2), FRZ_ERROR_ARGUMENT, "flow 0: triangle = 1058 is out of range: the mesh has 1058");
     flows[0].triangle = 0, flows[1].shares[0] = 0.7;
     FAILS(frz_shallow_set_flows(shallow, flows, 2), FRZ_ERROR_ARGUMENT, "flow 1: the sum of the shares");
     WORKS(frz_shallow_flow_moved(shallow, 1, &moved[0]));

@@ -55,7 +55,7 @@ static void null_everywhere(frz_context *ctx) {
     FAILS(frz_shallow_probe(shallow, view_of(place, 1), span_of(NULL, 1)), WRONG, "dst: the data is NULL");
     FAILS(frz_shallow_volume(shallow, NULL, NULL, 0, NULL), WRONG, "volume is NULL");
     FAILS(frz_shallow_volume(shallow, place, NULL, FRZ_SHALLOW_ALL_LAYERS, &volume), WRONG, "high is NULL");
-    FAILS(frz_shallow_volume(shallow, place, place, 0, &volume), WRONG, "a box has no layer");
+    FAILS(frz_shallow_volume(shallow, place, place, 0, &volume), WRONG, "give either a layer or a box");
     FAILS(frz_shallow_save(ctx, shallow, NULL, 0, NULL), WRONG, "size is NULL");
     FAILS(frz_shallow_restore(ctx, shallow, NULL, 5), WRONG, "state is NULL");
     FAILS(frz_shallow_layout_init(NULL, sizeof(frz_shallow_layout)), WRONG, "frz_shallow_layout is NULL");

@@ -66,7 +66,7 @@ static void loads(frz_context *ctx) {
     FAILS(frz_shallow_loads(shallow, water, view_of(NULL, 2), wide, 2), WRONG, "velocities: the data is NULL");
     wild[1][2] = (double)INFINITY;
     FAILS(frz_shallow_loads(shallow, water, view_of(wild, 2), wide, 2), WRONG, "the velocity of body 1 is not finite");
-    FAILS(frz_shallow_loads(shallow, water, NO_VIEW, wide, 1), WRONG, "count = 1 is not that of the 2 bodies");
+    FAILS(frz_shallow_loads(shallow, water, NO_VIEW, wide, 1), WRONG, "count = 1, but there are 2 bodies");
     FAILS(frz_shallow_loads(shallow, water, NO_VIEW, NULL, 2), WRONG, "loads: the data is NULL");
     FAILS(frz_shallow_loads(NULL, water, NO_VIEW, wide, 2), WRONG, "the shallow liquid is NULL");
     wide[1].struct_size = 8;

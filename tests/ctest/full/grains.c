@@ -179,7 +179,7 @@ static void attributes(const frz_grains *grains, int last) {
     into.stride = 23;
     FAILS(frz_grains_read(grains, FRZ_GRAINS_POSITION_DOUBLE, into), FRZ_ERROR_ARGUMENT, "less than an element's 24");
     into.stride = (size_t)-1 / 2;
-    FAILS(frz_grains_read(grains, FRZ_GRAINS_POSITION, into), FRZ_ERROR_ARGUMENT, "more than a memory holds");
+    FAILS(frz_grains_read(grains, FRZ_GRAINS_POSITION, into), FRZ_ERROR_ARGUMENT, "exceed the address space");
     FAILS(frz_grains_read(grains, 9, span_of(ids, count)), FRZ_ERROR_ARGUMENT, "not a value of frz_grains_attribute");
     into.data = NULL, into.stride = 0;
     FAILS(frz_grains_read(grains, FRZ_GRAINS_POSITION, into), FRZ_ERROR_ARGUMENT, "dst: the data is NULL");

@@ -37,7 +37,7 @@ static frz_grid *plane(frz_context *ctx, double voxel) {
     FAILS(frz_grid_create(ctx, &desc, &(frz_grid *){NULL}), FRZ_ERROR_ARGUMENT, "leaf 0: a value is not finite");
     values[0][77] = values[1][77];
     desc.background = (float)voxel;
-    FAILS(frz_grid_create(ctx, &desc, &(frz_grid *){NULL}), FRZ_ERROR_ARGUMENT, "background: the band is 1.00 voxels");
+    FAILS(frz_grid_create(ctx, &desc, &(frz_grid *){NULL}), FRZ_ERROR_ARGUMENT, "background: the half width of the band is 1.00 voxels");
     desc.grid_class = 9;
     FAILS(frz_grid_create(ctx, &desc, &(frz_grid *){NULL}), FRZ_ERROR_ARGUMENT, "not a value of frz_grid_class");
     return grid;
@@ -133,7 +133,7 @@ static void files_and_bytes(frz_context *ctx, const frz_grid *grid) {
     FAILS(frz_grid_save(ctx, one, 1, "no such folder/a.vdb", 0, 0), FRZ_ERROR_IO, "no such folder");
     FAILS(frz_grid_save(ctx, one, 1, "a.vdb", 7, 0), FRZ_ERROR_ARGUMENT, "not a value of frz_compression");
     FAILS(frz_grid_save(ctx, one, 1, "a.vdb", 0, 6), FRZ_ERROR_ARGUMENT, "flags");
-    FAILS(frz_grid_save(ctx, one, 0, "a.vdb", 0, 0), FRZ_ERROR_ARGUMENT, "there is none");
+    FAILS(frz_grid_save(ctx, one, 0, "a.vdb", 0, 0), FRZ_ERROR_ARGUMENT, "the list is empty");
     WORKS(frz_grid_to_bytes(ctx, both, 2, FRZ_COMPRESSION_BLOSC, 0, NULL, 0, &bound));
     data = malloc(bound);
     CHECK(data != NULL);

@@ -105,10 +105,10 @@ static void wrong_ones_are_refused(frz_context *ctx) {
     desc.positions.stride = 8;
     FAILS(frz_mesh_create(ctx, &desc, &mesh), FRZ_ERROR_ARGUMENT, "less than an element's 12");
     desc.positions.stride = (size_t)1 << 62;
-    FAILS(frz_mesh_create(ctx, &desc, &mesh), FRZ_ERROR_ARGUMENT, "more than a memory holds");
+    FAILS(frz_mesh_create(ctx, &desc, &mesh), FRZ_ERROR_ARGUMENT, "exceed the address space");
     desc.positions.stride = 0;
     desc.positions.count = (size_t)-1;
-    FAILS(frz_mesh_create(ctx, &desc, &mesh), FRZ_ERROR_ARGUMENT, "more than a memory holds");
+    FAILS(frz_mesh_create(ctx, &desc, &mesh), FRZ_ERROR_ARGUMENT, "exceed the address space");
     desc.positions = view_of(NULL, 4);
     FAILS(frz_mesh_create(ctx, &desc, &mesh), FRZ_ERROR_ARGUMENT, "the data is NULL");
     desc.positions = view_of(positions, 4);

@@ -235,7 +235,7 @@ static void refused(frz_context *ctx, frz_grid *grid) {
     FAILS(frz_grid_create(ctx, &desc, &snow), wrong, "leaf 1: a value is not finite");
     values[1][100][2] = values[1][101][2] + 1;
     EMPTY(desc), desc.voxel_size = 1, desc.grid_class = FRZ_GRID_STAGGERED;
-    FAILS(frz_grid_create(ctx, &desc, &snow), wrong, "floats are not staggered");
+    FAILS(frz_grid_create(ctx, &desc, &snow), wrong, "only vectors can be staggered");
     CHECK(snow == NULL);
 }
 

@@ -226,7 +226,7 @@ fn turned_and_mirrored_dye_is_the_same() {
 fn bad_scalars_are_a_sentence() {
     let mut detail = scene(Border::Closed, [16..32, 8..28]);
     let error = detail.set_poured(&[1.0]).unwrap_err().to_string();
-    assert_eq!(error, "1 concentrations are not one for each of 4 scalars");
+    assert_eq!(error, "1 concentrations for 4 scalars: one each is needed");
     assert!(detail.set_sourced(9, &[0.0; 4]).unwrap_err().to_string().contains("there is no flow point 9"));
     assert_eq!(detail.scalar_balance(4).unwrap_err().to_string(), "there is no scalar 4 among 4");
     let thickening = frazil::shallow::Thickening { scalar: 0, from: 0.0, to: 1.0, times: 2.0 };

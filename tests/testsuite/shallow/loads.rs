@@ -144,7 +144,7 @@ fn what_is_dry_feels_nothing_and_wrong_numbers_are_a_sentence() {
         liquid.loads(density, velocities, &mut vec![Load::default(); room]).unwrap_err().to_string()
     };
     assert_eq!(said(f64::NAN, &[[0.0; 3]], 1), "density = NaN kg/m3 is not positive and finite");
-    assert_eq!(said(1e3, &[], 1), "0 velocities are not one for each of 1 bodies");
-    assert_eq!(said(1e3, &[[0.0; 3]], 2), "2 loads are not one for each of 1 bodies");
+    assert_eq!(said(1e3, &[], 1), "0 velocities for 1 bodies: one each is needed");
+    assert_eq!(said(1e3, &[[0.0; 3]], 2), "2 loads for 1 bodies: one each is needed");
     assert_eq!(said(1e3, &[[0.0, f64::INFINITY, 0.0]], 1), "the velocity of body 0 is not finite");
 }

@@ -263,7 +263,9 @@ fn boxes_without_an_inside_are_refused() {
     assert_eq!(error.to_string(), "box 1: a box from [0.0, 0.0, 0.0] to [1.0, NaN, 1.0] m has no inside");
     assert_eq!(out, [7.0; 2]);
     let error = view.volumes(&boxes, &mut out[..1]).unwrap_err();
-    assert!(matches!(error, Error::Argument(what) if what == "room for 1 volumes is not that of 2 boxes"));
+    assert!(
+        matches!(error, Error::Argument(what) if what == "there is room for 1 volumes, but there are 2 boxes")
+    );
 }
 
 #[test]
@@ -313,7 +315,7 @@ fn points_are_read_of_a_snapshot_as_of_the_liquid() {
         assert_eq!(reading, copied, "{point:?}");
     }
     let error = shallow.view().read(&points, &mut copied[1..]).unwrap_err();
-    assert_eq!(error.to_string(), "room for 499 readings is not that of 500 points");
+    assert_eq!(error.to_string(), "there is room for 499 readings, but there are 500 points");
 }
 
 #[test]

@@ -394,7 +394,7 @@ fn wrong_scalars_are_a_sentence() {
         assert_eq!(liquid.set_scalars(&[scalar]).unwrap_err().to_string(), what);
     }
     assert_eq!(liquid.scalars(), [Scalar::dye("dye")]);
-    let not_one = "2 concentrations are not one for each of 1 scalars";
+    let not_one = "2 concentrations for 1 scalars: one each is needed";
     assert_eq!(liquid.set_poured(&[0.0, 0.0]).unwrap_err().to_string(), not_one);
     let nan = "a concentration of NaN of \"dye\" is not within -1 to 1";
     assert_eq!(liquid.set_poured(&[f64::NAN]).unwrap_err().to_string(), nan);

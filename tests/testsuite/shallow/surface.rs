@@ -250,26 +250,26 @@ fn what_does_not_fit_is_an_error_and_writes_nothing() {
         &Depths { depth: &depth[1..], ..good },
         &layout,
         &mut none,
-        &format!("{} depths are not one for each of {len} indices", len - 1),
+        &format!("{} depths for {len} indices: one each is needed", len - 1),
     );
     fails(
         &Depths { velocity: &[[0.0; 2]], ..good },
         &layout,
         &mut none,
-        &format!("1 velocities are not one for each of {len} indices"),
+        &format!("1 velocities for {len} indices: one each is needed"),
     );
     fails(
         &Depths { active: Some(&[true]), ..good },
         &layout,
         &mut none,
-        &format!("1 flags of activity are not one for each of {} strips", len / 16),
+        &format!("1 flags of activity for {} strips: one each is needed", len / 16),
     );
     let bad = |name: &str, layout: Layout, what: &str| {
         fails(&good, &layout, &mut Target::default(), &format!("{name} = {what}"));
     };
     bad("scale", Layout { scale: 0.0, ..layout }, "0 is not positive and finite");
     bad("opaque_depth", Layout { opaque_depth: f64::NAN, ..layout }, "NaN is not positive and finite");
-    bad("least_depth", Layout { least_depth: -0.5, ..layout }, "-0.5 is not finite and 0 or more");
+    bad("least_depth", Layout { least_depth: -0.5, ..layout }, "-0.5 is negative or not finite");
 }
 
 #[test]
@@ -356,6 +356,6 @@ fn vertices_carry_what_their_columns_do_and_dry_ones_what_is_around() {
     target.carried[2] = Some(&mut short);
     refused(&depths, &mut target, "carried has room for");
     let depths = Depths { carried: [&dye[1..], &[], &[], &[]], ..depths };
-    refused(&depths, &mut Target::default(), "concentrations are not one for each of");
+    refused(&depths, &mut Target::default(), "concentrations for");
     assert!(room.iter().all(|number| number.is_nan()));
 }

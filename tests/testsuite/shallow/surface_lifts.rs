@@ -319,7 +319,7 @@ fn what_makes_no_sense_is_an_error() {
     fails(&positions, &[[0, 1, 3]], usual, "triangle 0 of the terrain has a corner beyond its 3 vertices");
     fails(&[Vec3::new(0.0, f32::NAN, 0.0)], &[], usual, "vertex 0 of the terrain is not finite");
     let bad = Distance { margin: -1.0, ..usual };
-    fails(&positions, &faces, bad, "a distance of -1 cells is not finite and 0 or more");
+    fails(&positions, &faces, bad, "a distance of -1 cells is negative or not finite");
     let error =
         MinimumHeights::default().update(&columns, &positions, &faces, usual, [0..5, 0..3]).unwrap_err();
     assert_eq!(error.to_string(), "cells 0..5 x 0..3 are not a box within 4 x 3 cells");
@@ -328,7 +328,7 @@ fn what_makes_no_sense_is_an_error() {
     let error = Surface::default().count(&columns, &depths).unwrap_err();
     assert_eq!(
         error.to_string(),
-        format!("1 least depths are not one for each of {} indices", columns.len())
+        format!("1 least depths for {} indices: one each is needed", columns.len())
     );
     // One row of cells has no quartet.
     let grid = Grid { size: [4, 1], ..columns.grid };

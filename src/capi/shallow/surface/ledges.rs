@@ -1,4 +1,4 @@
-//! Ledges of shallow liquid: where its surface ends over nothing, and comes down to the ground's edge.
+//! Ledges of shallow liquid: where the ground ends, and the surface comes down to its edge.
 
 use super::frz_shallow_size;
 use super::prepared::FoundLedges;
@@ -8,9 +8,9 @@ use crate::capi::shallow::calls::changes;
 use crate::capi::shallow::ground::Terrain;
 use crate::capi::shallow::handle::{ShallowHandle, frz_shallow};
 
-/// Finds the ledges, where the ground ends over nothing, as at the edges of shelves and of holes, for surfaces with FRZ_SHALLOW_SKIRTED.
-/// With the mesh that the liquid was created with, the edge is located between the centres of cells; on other ground the surface extends by
-/// half a cell. A real-time call (see frz_shallow): it visits all triangles once. Call it again after frz_shallow_update_terrain or
+/// Finds the ledges, where the ground ends, as at the edges of shelves and of holes, for surfaces with FRZ_SHALLOW_SKIRTED. With the mesh
+/// that the liquid was created with, the edge is located between the centres of cells; on other ground the surface extends by half a cell.
+/// A real-time call (see frz_shallow): it visits all triangles once. Call it again after frz_shallow_update_terrain or
 /// frz_shallow_set_bodies have moved something, before the next such surface.
 ///
 /// size: receives the maximum that this adds to frz_shallow_surface_bound, all zeroes after a failure; may be NULL. Its struct_size is set

@@ -38,9 +38,9 @@ pub struct frz_shallow_fitted {
     pub reserved: u32,
     /// All of them.
     pub upward: u64,
-    /// Those of them more than a cell above the surrounding ground: they may be above the surface.
+    /// Vertices more than a cell above the surrounding ground, which may show through the surface.
     pub discarded: u64,
-    /// Of the others, those too close below a ceiling.
+    /// Of the others, those so close to a ceiling that the surface cannot cover them.
     pub capped: u64,
 }
 

@@ -25,8 +25,8 @@ pub const FRZ_SHALLOW_LEFT_HANDED: u32 = 2;
 /// found them since the ground or a body last moved.
 pub const FRZ_SHALLOW_LIFTED: u32 = 4;
 
-/// Flag of a layout: where the ground ends over nothing, the surface extends to the ground's edge and comes down to it, instead of ending
-/// at the centre of the last cell, open below. frz_shallow_find_ledges must have found the edges since the ground or a body last moved.
+/// Flag of a layout: where the ground ends, the surface extends to the ground's edge and comes down to it, instead of ending at the centre
+/// of the last cell, open below. frz_shallow_find_ledges must have found the edges since the ground or a body last moved.
 pub const FRZ_SHALLOW_SKIRTED: u32 = 8;
 
 /// How a surface is written.
@@ -85,7 +85,7 @@ pub struct frz_shallow_target {
     pub normals: frz_span,
     /// float for each vertex: depth (m x scale); 0 where it is dry.
     pub depths: frz_span,
-    /// float for each vertex: depth over frz_shallow_layout.opaque_depth, at most 1.
+    /// float for each vertex: depth divided by frz_shallow_layout.opaque_depth, at most 1.
     pub opacities: frz_span,
     /// float[3] for each vertex: velocity at the surface (m/s x scale), 1.5 times the mean one, horizontal.
     pub velocities: frz_span,

@@ -66,7 +66,7 @@ impl FoundLedges {
     /// The ledges if a surface is skirted; a failure if they do not match the current ground. `when` completes the error.
     pub(in crate::capi) fn requested(&self, is_skirted: bool, when: &str) -> Outcome<Option<&Ledges>> {
         refuse(is_skirted && !self.is_current, || {
-            format!("FRZ_SHALLOW_SKIRTED: frz_shallow_find_ledges has found no ledges {when}")
+            format!("FRZ_SHALLOW_SKIRTED: frz_shallow_find_ledges was not called {when}")
         })?;
         Ok(is_skirted.then_some(&self.ledges))
     }
@@ -102,7 +102,7 @@ pub(in crate::capi) fn requested_heights<'a>(
     when: &str,
 ) -> Outcome<(&'a [i32], &'a [i32])> {
     refuse(is_lifted && known.is_none(), || {
-        format!("FRZ_SHALLOW_LIFTED: frz_shallow_find_lifts has found no minimum heights {when}")
+        format!("FRZ_SHALLOW_LIFTED: frz_shallow_find_lifts was not called {when}")
     })?;
     Ok(known.filter(|_| is_lifted).unwrap_or_default())
 }

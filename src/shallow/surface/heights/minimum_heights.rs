@@ -164,7 +164,7 @@ impl MinimumHeights {
         if let Some(bad) =
             [least, margin, rim].into_iter().find(|length| !(*length >= 0.0 && length.is_finite()))
         {
-            return Err(Error::argument(format!("a distance of {bad} cells is not finite and 0 or more")));
+            return Err(Error::argument(format!("a distance of {bad} cells is negative or not finite")));
         }
         check_cells(&cells, size)?;
         // Quartets with a cell of the box extend one cell further.
