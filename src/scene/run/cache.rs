@@ -198,8 +198,8 @@ impl Cache {
         Resumable { first, own_from: self.own_from(), done: &self.stored }
     }
 
-    /// Fails if the inputs of a frame have changed since it was made. If only its files of the coming frame have changed or appeared, and the
-    /// frame is requested, it is left out, and so made again.
+    /// Fails if the inputs of a frame have changed since it was made. If only the files of the coming frame that it reads have changed or
+    /// appeared, and the frame is requested, it is left out, and so made again.
     ///
     /// # Errors
     /// The changed frame; a file that cannot be read.
@@ -310,7 +310,7 @@ fn check_from(
     if frames.last() < from {
         let (low, high) = (frames.first(), frames.last());
         return refused(format!(
-            "--from {from} makes nothing of --frames {low}-{high}: ask for frames from {from} on"
+            "--from {from} leaves nothing to make of --frames {low}-{high}: ask for frames from {from} on"
         ));
     }
     if from <= first {

@@ -1,5 +1,5 @@
 //! A hash of the inputs of each frame of a stage: of the settings, of every file that it reads, of the upstream frames and, for stages with
-//! memory, of the frames before it.
+//! memory ([`Stage::has_memory`]), of the frames before it.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -36,8 +36,8 @@ impl HashChain {
         Self { first, links: vec![start.finish()], input_hashes: input_hashes.clone() }
     }
 
-    /// The hashes of a frame; one before the first depends on the seed alone. If an upstream frame no longer exists, the hash in the stage's
-    /// own record counts.
+    /// The hashes of a frame; those of a frame before the first depend on the seed alone. If an upstream frame no longer exists, the hash in
+    /// the stage's own record counts.
     ///
     /// # Errors
     /// A file that cannot be read; a frame that is neither done nor has all its inputs.

@@ -128,7 +128,7 @@ impl DoneFrames {
     pub fn frames_of_state(&self, frame: i32) -> Result<RangeInclusive<i32>> {
         let whole = (0..).map(|back| frame - back).find(|&frame| !self.keeps_changes(frame));
         let whole = whole.filter(|whole| self.is_done(*whole));
-        let missing = || Error::file(&self.folder, format!("frame {frame} cannot be had from its files"));
+        let missing = || Error::file(&self.folder, format!("frame {frame} cannot be read from its files"));
         Ok(whole.ok_or_else(missing)?..=frame)
     }
 

@@ -17,7 +17,7 @@ use crate::io::files::atomic;
 use crate::io::records::checksummed;
 use crate::io::records::manifest::{Keeps, Manifest};
 
-/// After this many consecutive frames that cannot be written a pass ends: the disk is full or gone.
+/// A pass ends after this many consecutive frames that cannot be written: the disk is full or gone.
 const MAX_FAILURES: usize = 3;
 /// Maximum number of steps that wait for the writer, each a few MB.
 const MAX_WAITING: usize = 2;

@@ -47,7 +47,7 @@ pub trait Stage: Sync {
         "state/ keeps those of the last two frames"
     }
 
-    /// Its kinds of files. With [`Keeps::Whole`] or [`Keeps::Changes`], the kind of the stage's own name holds the state.
+    /// Its kinds of files. With [`Keeps::Whole`] or [`Keeps::Changes`], the kind with the stage's own name holds the state.
     fn kinds(&self) -> &'static [FileKind];
 
     /// Whether this scene has files of a kind.
@@ -101,7 +101,7 @@ pub trait Stage: Sync {
         Reads::default()
     }
 
-    /// From what a later run can resume after a frame.
+    /// What a later run can resume from after a frame.
     fn keeps(&self, _frame: i32) -> Keeps {
         Keeps::State
     }

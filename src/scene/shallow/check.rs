@@ -50,7 +50,7 @@ pub struct Report {
     pub heights_m: [f64; 2],
     /// Resolution of heights and depths (m).
     pub unit_m: f64,
-    /// Kinematic viscosity (m2/s); of a thinning liquid at rest.
+    /// Kinematic viscosity (m2/s); for a thinning liquid, that at rest.
     pub viscosity_m2_per_s: f64,
     /// Liquid at the first frame (ml).
     pub begins_with_ml: f64,
@@ -138,7 +138,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
 
 /// Moves terrain, obstacles and points through all later frames; returns a sentence for each point that rests while it should be active.
 fn warnings_of_later_frames(ctx: &Context, scene: &Scene, mut state: LiquidState<'_>) -> Result<Vec<String>> {
-    // The first such frame and the number of such frames, by the point's name.
+    // The first frame at which a point rests and the number of such frames, by the point's name.
     let mut resting: BTreeMap<String, (i32, usize)> = BTreeMap::new();
     for frame in scene.shot.frames.iter().skip(1) {
         ctx.check()?;
@@ -225,7 +225,7 @@ fn probable_mistakes(
     let fills = setup.fill.is_some() && setup.params.border == Border::Open;
     if fills && columns.indices().any(|index| depths[index] > 0 && is_border(index)) {
         out.push(
-            "what stands up to shallow.fill flows off at the border, which is open: \"closed\" or \"absorbing\" keep it".into(),
+            "the liquid of shallow.fill flows off at the border, which is open: \"closed\" or \"absorbing\" keep it".into(),
         );
     }
     out.extend(unused_scalars(setup));

@@ -19,7 +19,8 @@ const SCALAR: u64 = 62;
 /// Additional bytes of a column for friction at walls, and for viscosity that depends on a scalar.
 const WALLS: u64 = 108;
 const THICK: u64 = 12;
-/// Bytes of a drop: its own data 500; its ball and strand 5,600, while they are made and in up to three steps that wait for the writer.
+/// Bytes of a drop: its own data 500; its ball and strand 5,600 while they are made, and in each of up to three steps that
+/// wait for the writer.
 const DROP: u64 = 22_900;
 /// Bytes of a triangle of the terrain: corners and a position, in two copies and with scratch data while it is read or while minimum
 /// heights are found.
@@ -83,7 +84,7 @@ pub(in crate::scene::shallow) fn frame_bytes(setup: &Shallow, columns: u64, tria
     let state = STATE + STATE_OF_SCALAR * scalars;
     let each = if_asked(output.ply, ply) + if_asked(output.usd, usd) + if_asked(output.vdb, VOXEL) + state;
     let drops = setup.params.falls.map_or(0, |falls| falls.max_packets);
-    // For each vertex of its mesh two triangles.
+    // A drop's mesh has two triangles for each vertex.
     let in_air = bound(drops).vertices as u64 * (if_asked(output.ply, ply) + if_asked(output.usd, usd));
     let stained = if_asked(setup.staining.is_some(), FILE_OF_STAINED * triangles);
     columns * each + in_air + stained + drops as u64 * STATE_OF_DROP + RECORDS

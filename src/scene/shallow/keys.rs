@@ -49,9 +49,9 @@ pub const KEYS: &[Key] = &[
     key(FIRST, "shallow", "area", Numbers(4, FAR, "m"), optional("[-0.1, -0.1, 0.1, 0.1]"))
         .means("extent of the cells: x0, z0, x1, z1 (m), rounded to whole cells; default: that of the terrain at the first frame"),
     key(FIRST, "shallow", "bottom", Number(-FAR, FAR, "m"), optional("-0.01"))
-        .means("minimum height (m) of ground and liquid; default: the terrain's lowest point, for a sequence lower by the same margin as top"),
+        .means("minimum height (m) of ground and liquid; default: the terrain's lowest point; for a sequence, below that by the margin of `top`"),
     key(FIRST, "shallow", "top", Number(-FAR, FAR, "m"), optional("0.1"))
-        .means("maximum height (m); default: above the terrain's highest point by a margin of a quarter of its height, at least 0.1 m"),
+        .means("maximum height (m); default: above the terrain's highest point, or `fill` if that is higher, by a margin of a quarter of the terrain's height, at least 0.1 m"),
     key(STEP, "shallow", "liquid", Choice(&["water", "blood", "paint", "honey"]), or("\"blood\""))
         .means("water, blood, paint or honey: its viscosity, and its look"),
     key(STEP, "shallow", "viscosity", Number(0.0, 1.0e6, "m2/s"), or("4e-6"))
@@ -62,13 +62,13 @@ pub const KEYS: &[Key] = &[
     key(STEP, "shallow", "gravity", Numbers(3, 1000.0, "m/s2"), or("[0.0, -9.81, 0.0]"))
         .means("x, y, z (m/s2); it may tilt by up to 45 degrees"),
     key(FIRST, "shallow", "border", Choice(&["open", "closed", "absorbing"]), or("\"open\""))
-        .means("of the area: open: liquid flows off; closed: a wall; absorbing: waves leave into liquid at rest"),
+        .means("of the area: open: liquid flows off; closed: a wall; absorbing: waves leave into liquid at rest beyond it"),
     key(FIRST, "shallow", "fill", Number(-FAR, FAR, "m"), optional("0.005"))
         .means("height up to which liquid stands at the first frame (m)"),
     key(STEP, "shallow", "kept", Number(0.0, 1.0, ""), or("0.5"))
         .means("share of its momentum that liquid keeps over a second, apart from viscous losses"),
     key(STEP, "shallow", "pace", Choice(&["exact", "realtime"]), or("\"exact\""))
-        .means("exact: as many steps as waves need; realtime: steps of at most `step`, with slower waves in deep liquid and slower fast films on slopes"),
+        .means("exact: as many steps as waves need; realtime: steps of at most `step`, which slow waves in deep liquid and fast films on slopes"),
     key(STEP, "shallow", "step", Number(1.0e-6, 1.0, "s"), or("0.003")).means("longest step of realtime (s)"),
     key(FIRST, "shallow", "friction", Choice(&["ground", "walls"]), or("\"ground\""))
         .means("where viscous drag acts: ground: accurate for liquid that is far wider than deep; walls: also at walls and ceilings, for channels and ducts, which takes longer"),
@@ -100,17 +100,17 @@ pub const KEYS: &[Key] = &[
 /// The keys of the arrays of tables (`[[scalar]]` to `[[object]]`), and of `[output]`.
 pub const TABLE_ARRAY_KEYS: &[Key] = &[
     key(FIRST, "scalar", "name", Text, required("\"dye\""))
-        .means("name of a scalar that the liquid carries, up to four, and of its array on the surface's vertices; letters, digits and _"),
+        .means("name of a scalar that the liquid carries (at most four scalars), and of its array on the surface's vertices; letters, digits and _"),
     key(FIRST, "scalar", "law", Choice(&["dye", "decays", "ages"]), or("\"dye\""))
         .means("dye: it is only carried; decays: half of it is gone after each half_life; ages: it is the time (s) since the liquid came in"),
     key(FIRST, "scalar", "half_life", Number(1.0e-6, 1.0e12, "s"), optional("60.0"))
-        .means("half-life of one that decays (s)"),
+        .means("half-life of a scalar that decays (s)"),
     key(FIRST, "scalar", "range", Number(1.0e-9, 1.0e9, ""), or("1.0"))
         .means("concentrations lie within -range to range, with a precision of range / 2^20; for ages: the maximum age (s)"),
     key(FIRST, "scalar", "start", Number(-1.0e9, 1.0e9, ""), or("0.0"))
         .means("concentration in liquid from `fill`, and in pours and sources whose `carries` does not name it"),
     key(STEP, "scalar", "stains", Flag, or("false"))
-        .means("for one scalar, with shallow.stains: true: its concentration / range stains, and clear liquid washes stains off; without such a scalar any liquid stains"),
+        .means("for one scalar, if shallow.stains is true; true: it stains by its concentration / range, and clear liquid washes stains off; without such a scalar any liquid stains"),
     key(STEP, "scalar", "thickens_times", Number(1.0e-6, 1.0e9, ""), optional("5.0"))
         .means("for one scalar: factor of the liquid's viscosity from the concentration `thickens_to` on; 1 up to `thickens_from`, and linear between them"),
     key(STEP, "scalar", "thickens_from", Number(-1.0e9, 1.0e9, ""), or("0.0"))
@@ -165,7 +165,7 @@ pub const TABLE_ARRAY_KEYS: &[Key] = &[
     key(STEP, "absorber", "until", FRAMES, optional("120")).means("last frame; default: to the end"),
     key(STEP, "absorber", "follows", Flag, or("false")).means(FOLLOWS),
     key(STEP, OBJECT, "shape", Choice(&["sphere", "capsule", "box"]), optional("\"capsule\""))
-        .means("sphere, capsule or box: an obstacle that may move; or file"),
+        .means("sphere, capsule or box: an obstacle that may move; instead of file"),
     key(STEP, OBJECT, "radius", LENGTH, optional("0.004")).means("of a sphere or capsule (m)"),
     key(STEP, OBJECT, "length", LENGTH, optional("0.06"))
         .means("of a capsule, along y, between the centres of its ends (m)"),

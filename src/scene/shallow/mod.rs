@@ -105,9 +105,9 @@ pub struct Pour {
 /// A source, a drain or an absorber with the frames at which it is active.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimedFlowPoint {
-    /// Its table, `source`, and its index there, from 0.
+    /// Its table, such as `source`, and its index there, from 0.
     pub name: (&'static str, usize),
-    /// The flow point; if it follows the terrain, its position before it is attached.
+    /// The flow point; if it follows the terrain, at the position that the scene gives.
     pub flow_point: FlowPoint,
     /// Concentrations of the scalars in the liquid of a source.
     pub carries: Vec<f64>,

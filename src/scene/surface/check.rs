@@ -42,7 +42,8 @@ pub struct Report {
     pub size_m: [f64; 3],
     /// Mean length of its edges (m).
     pub edge_m: f64,
-    /// Estimated memory of the run (bytes); it may be more if vertices keep more than half a spacing from the surface.
+    /// Estimated memory of the run (bytes); it may be more if vertices keep a distance of more than half a spacing from
+    /// the particles' surface.
     pub memory_bytes: u64,
     /// Estimated size of the files (bytes).
     pub disk_bytes: u64,

@@ -54,9 +54,9 @@ pub struct Surface {
     pub rebuild: bool,
     /// If it is rebuilt: whether its topology is matched everywhere in every step; else only where vertices are flagged.
     pub every: bool,
-    /// If it is rebuilt: parts with fewer particles are removed, except the last part.
+    /// If it is rebuilt: parts with fewer particles are removed, unless the mesh is a single part.
     pub min_drop: usize,
-    /// If it is rebuilt: number of frames before a change over which it eases towards it (0..=100).
+    /// If it is rebuilt: number of frames before a change over which the mesh eases towards the change (0..=100).
     pub ahead: i32,
     /// How particles carry vertices.
     pub weighting: Weighting,
@@ -127,7 +127,7 @@ impl Surface {
     pub(super) fn time(&self, shot: Frames, frame: i32) -> f64 {
         let passed = f64::from(frame) - f64::from(shot.first);
         let time = f64::from(shot.first) - self.offset + self.speed * passed;
-        // Without this a rounding error would make one more file be read.
+        // Without this a rounding error would cause one more file to be read.
         let whole = time.round();
         if (time - whole).abs() < 1e-6 { whole } else { time }
     }

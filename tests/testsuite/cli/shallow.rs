@@ -155,8 +155,8 @@ fn what_is_wrong_is_one_sentence_and_leaves_nothing_behind() {
     refused("--set shallow.area=[1,1,0,0]", &["`area`", "x0 < x1"]);
     refused("--set shallow.area=[1,1,2,2]", &["dish.obj", "no surface that faces up"]);
     refused("--set shallow.top=-1", &["from 0 m up to -1 m"]);
-    refused("--set shallow.thinning=true --set shallow.liquid=water", &["`thinning`", "of blood only"]);
-    refused("--set shallow.terrain_size=[1,1]", &["`terrain_size`", "of a .png image"]);
+    refused("--set shallow.thinning=true --set shallow.liquid=water", &["`thinning`", "for blood only"]);
+    refused("--set shallow.terrain_size=[1,1]", &["`terrain_size`", "for a .png image"]);
     refused("--set shallow.ground=1", &["unknown key `ground`", "the keys are"]);
     refused("--set pour.1.at=[1,0,0]", &["pour.1", "outside of the area"]);
     refused("--set pour.1.volume_ml=1e9", &["pour.1", "do not fit"]);
@@ -214,7 +214,7 @@ fn what_is_wrong_is_one_sentence_and_leaves_nothing_behind() {
     with(&format!("{thick}thickens_to = 0\n"), &["`thickens_to`", "must not be `thickens_from`, 0"]);
     with(&format!("{thick}thickens_to = 2\n"), &["`thickens_to`", "-1 to 1, its range"]);
     with(&format!("{thick}thickens_to = 1\nthickens_from = -3\n"), &["`thickens_from`", "-1 to 1"]);
-    with(&format!("{dye}thickens_to = 1\n"), &["`thickens_to`", "has `thickens_times`: leave it out"]);
+    with(&format!("{dye}thickens_to = 1\n"), &["`thickens_to`", "with `thickens_times`: leave it out"]);
     with(&format!("{dye}thickens_times = 0\n"), &["`thickens_times`", "not 0"]);
     let second = "[[scalar]]\nname = \"age\"\nthickens_times = 2\nthickens_to = 1\n";
     with(&format!("{thick}thickens_to = 1\n{second}"), &["`thickens_times`", "another scalar thickens"]);
@@ -237,7 +237,7 @@ fn what_is_wrong_is_one_sentence_and_leaves_nothing_behind() {
     with("[[object]]\nradius = 1\n", &["`shape`", "is missing (or `file`"]);
     with("[[object]]\nshape = \"sphere\"\n", &["`radius`", "is missing"]);
     with("[[object]]\nshape = \"box\"\nsize = [1, 1, 0]\n", &["`size`", "over 0 m"]);
-    with("[[object]]\nshape = \"box\"\nsize = [1, 1, 1]\nradius = 2\n", &["`radius`", "not of a box"]);
+    with("[[object]]\nshape = \"box\"\nsize = [1, 1, 1]\nradius = 2\n", &["`radius`", "not for a box"]);
     with(
         "[[object]]\nshape = \"sphere\"\nradius = 1\nfile = \"dish.obj\"\n",
         &["`file`", "excludes `shape`"],

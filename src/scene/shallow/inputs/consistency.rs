@@ -26,9 +26,7 @@ impl Shallow {
             return Err(table.error("terrain", "may be a sequence of meshes, not of other files"));
         }
         if !is_mesh && shallow.staining.is_some() {
-            return Err(
-                table.error("stains", "must be false: the terrain is no mesh that it could be an array of")
-            );
+            return Err(table.error("stains", "must be false: only a terrain that is a mesh can have stains"));
         }
         if shallow.area.is_some_and(|[x0, z0, x1, z1]| x1 <= x0 || z1 <= z0) {
             return Err(table.error("area", "must be [x0, z0, x1, z1] with x0 < x1 and z0 < z1"));
@@ -44,7 +42,7 @@ impl Shallow {
             return Err(table.error("fill", format!("must not be above `top`, {top} m")));
         }
         if shallow.params.liquid.thinning.is_some() && shallow.look != "blood" {
-            return Err(table.error("thinning", "is of blood only: leave it out"));
+            return Err(table.error("thinning", "is for blood only: leave it out"));
         }
         // The ranges of the keys imply all other conditions.
         shallow.params.validate().map_err(|_| {
@@ -79,7 +77,7 @@ impl Shallow {
                 scalars::check_concentrations(name, index, table, values)?;
                 let terrain = values.get("shallow.terrain").and_then(Value::path);
                 if own.get("follows") && terrain.and_then(Pattern::parse).is_none() {
-                    let what = "must be false where the terrain does not move: it needs a sequence of meshes, as \"organ.%04d.ply\"";
+                    let what = "must be false where the terrain does not move: it needs a sequence of meshes, such as \"organ.%04d.ply\"";
                     return Err(table.error("follows", what));
                 }
                 match (own.find::<i32>("from"), own.find::<i32>("until")) {
@@ -101,7 +99,7 @@ fn check_image(shallow: &Shallow, table: &Table, values: &Values) -> Result<()> 
             (true, false) => {
                 return Err(table.error(name, "is missing: an image needs its size and its heights (m)"));
             }
-            (false, true) => return Err(table.error(name, "is of a .png image: leave it out")),
+            (false, true) => return Err(table.error(name, "is for a .png image: leave it out")),
             _ => {}
         }
     }
@@ -132,11 +130,11 @@ fn check_object(index: usize, table: &Table, values: &Values) -> Result<()> {
     for name in ["radius", "length", "size"] {
         match (needed.contains(&name), own.value(name)) {
             (true, None) => {
-                return Err(table.error(name, format!("is missing: a {} has one", named.unwrap_or(""))));
+                return Err(table.error(name, format!("is missing: a {} needs one", named.unwrap_or(""))));
             }
             (false, Some(_)) => {
                 let shape = named.unwrap_or("mesh");
-                return Err(table.error(name, format!("is not of a {shape}: leave it out")));
+                return Err(table.error(name, format!("is not for a {shape}: leave it out")));
             }
             _ => {}
         }
@@ -150,7 +148,7 @@ fn check_object(index: usize, table: &Table, values: &Values) -> Result<()> {
             Err(table.error("size", "must be three lengths over 0 m"))
         }
         ObstacleShape::Mesh(..) if obstacle.keys.len() > 1 => {
-            Err(table.error("keys", "of a file are one at most: a mesh does not move (a shape does)"))
+            Err(table.error("keys", "of a file may be at most one: a mesh does not move (a shape does)"))
         }
         ObstacleShape::Mesh(path, _) if Pattern::parse(path).is_some() => Err(table
             .error("file", "must be one file: a mesh does not move (a shape does, and so does the terrain)")),

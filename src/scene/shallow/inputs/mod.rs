@@ -71,8 +71,7 @@ impl Inputs {
     /// Reads the terrain of the first frame and the meshes on it, after checking that no file of any frame is missing.
     ///
     /// # Errors
-    /// Errors in files or keys, with file and key: liquid that does not fit; cells that need more memory than the
-    /// context allows; cancel.
+    /// Errors in files or keys, with file and key; cells that need more memory than the context allows; cancel.
     pub fn load(ctx: &Context, scene: &Scene) -> Result<Self> {
         let (setup, frames) = (scene.shallow()?, scene.shot.frames);
         if setup.output.vdb && !cfg!(feature = "vdb") {
@@ -187,7 +186,7 @@ impl Inputs {
     }
 }
 
-/// The solids of a terrain, and whether it was reversed: a mesh of which no triangle faces up.
+/// The solids of a terrain, and whether it was reversed, as a mesh of which no triangle faces up.
 ///
 /// # Errors
 /// A terrain without a surface that faces up; cancel.
@@ -237,7 +236,7 @@ fn add_meshes(
         let on_it = on_it.map_err(|error| error.in_file(own))?;
         warnings.extend(rounding_warning(own, mesh, solids.grid.cell));
         if orientation.has_open() && orientation.warning().is_none() {
-            let what = "is not closed: below a surface of it that faces up all is solid";
+            let what = "is not closed: all below a surface of it that faces up is solid";
             warnings.push(format!("{}: {what}", own.display()));
         }
         *solids = united(solids, &on_it);
@@ -292,7 +291,7 @@ fn heights(setup: &Shallow, bounds: &[DVec3; 2]) -> Result<Heights> {
     Heights::between(bottom, top)
 }
 
-/// Warnings about points that are attached to a position to one side of them, as if given high above a slope.
+/// Warnings about points that are attached to a position to one side of them, as happens high above a slope.
 fn attachment_warnings(
     scene: &Scene,
     setup: &Shallow,

@@ -33,7 +33,7 @@ pub(in crate::scene::shallow) fn pour(
         let (cell, unit) = (liquid.columns().grid.cell, liquid.columns().heights.unit);
         if missing > 1e-6 * pour.volume + columns.len() as f64 * unit * cell * cell {
             let what = format!(
-                "{} ml do not fit into its circle: {:.6} ml are left (a greater radius or shallow.top)",
+                "{} ml do not fit into its circle: {:.6} ml are left (give a greater radius or shallow.top)",
                 pour.volume / ML,
                 missing / ML
             );

@@ -80,7 +80,7 @@ pub(in crate::scene::shallow) fn check(index: usize, table: &Table, values: &Val
             && name.bytes().all(|byte| is_letter(byte) || byte.is_ascii_digit())
     };
     if !is_word(name) {
-        return Err(table.error("name", "must be of letters, digits and _, and begin with no digit"));
+        return Err(table.error("name", "must consist of letters, digits and _, and begin with no digit"));
     }
     if RESERVED_NAMES.contains(&name) {
         return Err(
@@ -93,10 +93,10 @@ pub(in crate::scene::shallow) fn check(index: usize, table: &Table, values: &Val
     let own = values.element("scalar", index);
     match (own.text("law"), table.has("half_life")) {
         (Some("decays"), false) => {
-            return Err(table.error("half_life", "is missing: a scalar that decays has one"));
+            return Err(table.error("half_life", "is missing: a scalar that decays needs one"));
         }
         (Some("dye" | "ages"), true) => {
-            return Err(table.error("half_life", "is of law = \"decays\": leave it out"));
+            return Err(table.error("half_life", "is for law = \"decays\": leave it out"));
         }
         _ => {}
     }
@@ -122,12 +122,12 @@ fn check_thickening(index: usize, table: &Table, values: &Values, range: f64) ->
     let own = values.element("scalar", index);
     if own.value("thickens_times").is_none() {
         return match table.has("thickens_to") {
-            true => Err(table.error("thickens_to", "is of a scalar that has `thickens_times`: leave it out")),
+            true => Err(table.error("thickens_to", "is for a scalar with `thickens_times`: leave it out")),
             false => Ok(()),
         };
     }
     let Some(to) = own.find("thickens_to") else {
-        return Err(table.error("thickens_to", "is missing: a scalar with `thickens_times` has one"));
+        return Err(table.error("thickens_to", "is missing: a scalar with `thickens_times` needs one"));
     };
     let from: f64 = own.get("thickens_from");
     for (name, concentration) in [("thickens_from", from), ("thickens_to", to)] {

@@ -215,7 +215,7 @@ fn of_vdb(path: &Path, input_hashes: &InputHashes) -> Result<Terrain> {
         return Err(Error::file(path, format!("grid \"{}\" is not a level set", grid.name())));
     }
     if !grid.is_uniform() || grid.active_bbox().is_none() {
-        let what = if grid.is_uniform() { "is empty" } else { "has voxels that are no cubes" };
+        let what = if grid.is_uniform() { "is empty" } else { "has voxels that are not cubes" };
         return Err(Error::file(path, format!("grid \"{}\" {what}", grid.name())));
     }
     Ok(Terrain::Grid(grid))

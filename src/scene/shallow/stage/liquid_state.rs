@@ -75,7 +75,7 @@ impl<'a> LiquidState<'a> {
             stains.restore(&saved.stains)?;
         }
         if state.points != saved.points {
-            // The scene's points have changed: its new ones apply from here on.
+            // The scene's points have changed: the new ones apply from this frame on.
             state.liquid.set_flows_resting(&state.points, |index| setup.points[index].title())?;
         }
         setup.set_source_scalars(&mut state.liquid)?;
@@ -142,7 +142,7 @@ impl<'a> LiquidState<'a> {
         Ok(Moved { displaced: of_terrain.displaced + of_obstacles.displaced, ..last })
     }
 
-    /// Names of the points that are active over the step to its frame but rest, as they lie inside solid or outside the area.
+    /// Names of the points that are active over the step to this frame but rest, as they lie inside solid or outside the area.
     pub fn resting(&self) -> Vec<String> {
         flow_points::resting(self.setup, &self.liquid, self.frame).map(TimedFlowPoint::title).collect()
     }

@@ -74,7 +74,7 @@ impl<'a> Liquid<'a> {
         for point in liquid_state.resting().iter().filter(|point| !before.contains(point)) {
             let path = self.scene.path.display();
             log::warn!(
-                "{path}: {point}: at frame {frame} it lies inside solid or outside of the area, and rests until it does not"
+                "{path}: {point}: at frame {frame} it lies inside solid or outside of the area, and rests until it no longer does"
             );
         }
         Ok(did)

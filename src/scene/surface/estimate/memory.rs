@@ -20,15 +20,15 @@
 //! |---|---|---|
 //! | patch of phi, vertex of the particles' surface | again, for the next frame | 832, 156 |
 //! | particle of the next frame | position 24, in its cell 20 and while sorted 24 | 68 |
-//! | face of a cell, by area, that the mesh crosses | up to 1.7 edges of the grid, 100 each while they are sorted | 170 |
+//! | part of the mesh as large as a face of a cell | up to 1.7 edges of the grid cross it, 100 each while they are sorted | 170 |
 //! | block of Gamma | 512 nodes: value 4, in growing lists 64, equation 125 | 98816 |
 //! | triangle near such blocks | in five of them, in 32 bits 132 and a number 4 | 680 |
 //! | vertex of the mesh | in cells 24, units 12, as cut 25, before and after 48, names 12, sizes and drifts in four copies 80, state 36 | 237 |
 //! | triangle of the mesh | on the grid 12, as cut 20, while its edges are checked 82, state 36 | 150 |
 //! | vertex of the mesh in a coming frame, except the next | position 24, distance 4, flags 2, size and drift 20, velocities 24, name 8 | 82 |
 //! | triangle of such a mesh | corners twice 24, the mask 8 | 32 |
-//! | particle, if a mesh with ids carries data | its id and its first position | 32 |
-//! | triangle of the first mesh, or of the last edited one, then | in a tree | 84 |
+//! | particle, if particles have ids and the mesh carries data | its id and its first position | 32 |
+//! | triangle of the first mesh, or of the last edited one, in that case | in a tree | 84 |
 //! | number that the mesh carries | in two frames 16, state 16; 8 in each coming frame | 32 |
 //! | vertex of a mesh that carries data | source of its numbers | 40 |
 //! | triangle of such a mesh | source of its numbers 80, in a tree 84 | 164 |
@@ -66,7 +66,7 @@ const FIRST_POSITION: f64 = 32.0;
 const TREE: f64 = 84.0;
 /// Bytes of a particle of the next frame, whose surface is made at the same time.
 const AHEAD: f64 = 68.0;
-/// Bytes of a face of a cell that the mesh crosses, of a block of Gamma, and of a triangle near such blocks.
+/// Bytes of a part of the mesh as large as a face of a cell, of a block of Gamma, and of a triangle near such blocks.
 const CUT: [f64; 3] = [170.0, 98816.0, 680.0];
 /// Additional bytes of a vertex and of a triangle of the mesh.
 const REBUILT: [f64; 2] = [237.0, 150.0];
@@ -188,7 +188,7 @@ fn work(particles: f64, shell: f64, cell: f64) -> f64 {
 /// Counts of patches, of vertices and of blocks of distances of a surface whose shell has `shell` cubes, with cells of `cell` (r).
 ///
 /// Over a level surface the shell is two cubes thick. Patches of 4 cells lie within 2 r of it on both sides, each cell of its area has one
-/// vertex, and blocks of 8 cells extend as far as distances plus half their edge; drops have twice as many blocks.
+/// vertex, and blocks of 8 cells reach as far as distances do, plus half their edge; drops have twice as many blocks.
 fn surface(shell: f64, cell: f64) -> [f64; 3] {
     let patches = shell * (1.0 + cell) / (12.0 * cell.powi(3));
     let vertices = shell * 2.0 / cell.powi(2);

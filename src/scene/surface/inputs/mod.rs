@@ -109,7 +109,7 @@ impl Inputs {
         let fades = surface.half_life.is_some() || surface.fade != 0.0;
         let detail_retention = match &surface.mesh {
             Some(path) if fades => detail_retention(&mesh).map_err(|what| Error::file(path, what))?,
-            // A mesh that is rebuilt stores it in its states: a later frame may be the first that fades.
+            // A mesh that is rebuilt stores it in its states: detail may begin to fade at a later frame, by --from with other settings.
             Some(_) if surface.rebuild => detail_retention(&mesh).unwrap_or_default(),
             _ => Vec::new(),
         };
@@ -183,7 +183,7 @@ pub(super) fn read_mesh(
     Ok((mesh, warning.map(|warning| format!("{}: {warning}", path.display())).or_else(doubts)))
 }
 
-/// Detail retention, painted in the array `detail` of the vertices: shares 0..=1, as bytes 0 to 255.
+/// Detail retention, painted in the array `detail` of the vertices: shares 0..=1, or bytes 0 to 255.
 pub(super) fn detail_retention(mesh: &DetailedMesh) -> std::result::Result<Vec<f32>, String> {
     let is_detail = |array: &&MeshArray| array.name == "detail" && array.on == On::Vertices;
     let Some(array) = mesh.arrays.iter().find(is_detail) else { return Ok(Vec::new()) };
@@ -259,7 +259,7 @@ fn particles_surface(ctx: &Context, particles: &Particles, spacing: f64, cell: f
     Ok(Isosurface::new(&phi).mesh(&phi))
 }
 
-/// The mesh made ready for rebuilding: a closed 2-manifold by index without self-intersections, repaired in cells of an edge (m) if
+/// The mesh made ready for rebuilding: a closed 2-manifold by index without self-intersections, repaired in cells with this edge (m) if
 /// necessary; and a sentence about the repair.
 fn repaired_mesh(ctx: &Context, mesh: DetailedMesh, cell: f64) -> Result<(DetailedMesh, Option<String>)> {
     let faults = ctx.pool().install(|| Faults::of(&mesh.mesh));
@@ -277,7 +277,7 @@ fn repaired_mesh(ctx: &Context, mesh: DetailedMesh, cell: f64) -> Result<(Detail
         None
     } else {
         let fault = match (is_closed, is_outward) {
-            (false, _) => Some("is not closed as its indices have it"),
+            (false, _) => Some("is not closed as its indices connect it"),
             (true, false) => Some("is inside out in parts"),
             (true, true) => None,
         };

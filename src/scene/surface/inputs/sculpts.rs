@@ -46,7 +46,7 @@ pub fn frames(surface: &Surface, shot: Frames) -> Result<Vec<i32>> {
     let frames: Vec<i32> = (shot.first..=shot.last).filter(|frame| pattern.path(*frame).exists()).collect();
     if frames.is_empty() {
         let what = format!(
-            "no edited mesh (surface.resculpt) is there for any frame of the shot after its first, {}",
+            "no edited mesh (surface.resculpt) exists for any frame of the shot after its first, {}",
             shot.first
         );
         return Err(Error::file(path, what));
@@ -85,7 +85,7 @@ pub fn read_sculpt(ctx: &Context, surface: &Surface, inputs: &Inputs, frame: i32
     let fades = surface.half_life.is_some() || surface.fade != 0.0;
     let detail_retention = match detail_retention(&mesh) {
         Err(what) if fades => return Err(Error::file(path, what)),
-        // States store it: a later frame may be the first that fades.
+        // States store it: detail may begin to fade at a later frame, by --from with other settings.
         other => other.unwrap_or_default(),
     };
     let (mesh, faults) = conformed(mesh, &inputs.mesh);
@@ -148,7 +148,9 @@ fn conformed(edited: DetailedMesh, first: &DetailedMesh) -> (DetailedMesh, Vec<S
     };
     if !missing.is_empty() {
         let names = missing.join(", ");
-        faults.push(format!("lacks what the first frame's mesh carries: {names}; they are 0 from here on"));
+        faults.push(format!(
+            "lacks what the first frame's mesh carries: {names}; they are 0 from this frame on"
+        ));
     }
     if !ignored.is_empty() {
         let names = ignored.join(", ");

@@ -51,7 +51,7 @@ pub struct WrittenMesh {
 
 impl Track<'_> {
     /// The arrays that each frame computes. `unchanged_faces` is the count of faces of a mesh that was never rebuilt and carries no mask of
-    /// created faces: it gets one of zeros.
+    /// created faces: such a mesh gets a mask of zeros.
     fn arrays(&self, delta: &[f32], flags: &[bool], unchanged_faces: Option<usize>) -> Vec<MeshArray> {
         let array = |name: &str, on, number, values| MeshArray { name: name.into(), on, number, values };
         let output = self.surface.output;

@@ -35,7 +35,7 @@ pub struct TrackedShot<'a> {
     frame: i32,
     /// The current frame, and the following ones that were computed ahead.
     frames: VecDeque<TrackedFrame>,
-    /// The first frame that could not be computed ahead: it failed, or is beyond the shot's end.
+    /// The first frame that could not be computed ahead because of an error.
     end: Option<i32>,
     /// Whether warnings about the particles were logged.
     has_warned: bool,
@@ -105,7 +105,7 @@ impl<'a> TrackedShot<'a> {
             Arc::new(DetailedMesh { mesh: TriMesh { positions: Vec::new(), triangles }, ..detail })
         });
         let source = Source::of(ctx, surface.rebuild, None, inputs.mesh.clone(), &inputs.particles);
-        // The frame's files and report exist: its report is not used.
+        // The frame's files and report exist: this report is not used.
         let tracked = TrackedFrame { detail, ..TrackedFrame::new(tracker, source, Report::default()) };
         let mut shot = Self::new(context, frame, tracked);
         if let Some(sculpted) = sculpted {
@@ -116,7 +116,7 @@ impl<'a> TrackedShot<'a> {
                 }
                 None => {
                     log::warn!(
-                        "the edited mesh of frame {sculpted} is gone: what is made takes its texture from the mesh beside it"
+                        "the edited mesh of frame {sculpted} is gone: new triangles take their texture from the mesh beside them"
                     );
                     Source { sculpted: Some(sculpted), rest: None, ..shot.current().source.clone() }
                 }
@@ -163,8 +163,8 @@ impl<'a> TrackedShot<'a> {
         &self.frames[0]
     }
 
-    /// Positions (m) of the current vertices for output: those that a coming change will remove are already eased towards its result. With
-    /// their velocities (m/s) to the next frame, or from the previous one if the next is not known.
+    /// Positions (m) of the current vertices for output: those that a coming change will remove are already eased towards its result. Also
+    /// returns their velocities (m/s) to the next frame, or from the previous one if the next is not known.
     ///
     /// # Errors
     /// Cancel.
@@ -205,7 +205,7 @@ impl<'a> TrackedShot<'a> {
         eased(self.frames.iter().skip(index + 1).map(|tracked| &tracked.easing), self.surface.ahead as usize)
     }
 
-    /// The displacements of these vertices, as far as the mesh does not intersect itself.
+    /// The displacements of the vertices that [`Self::eased`] returns, reduced where the mesh would intersect itself.
     fn displaced(&self, ctx: &Context, index: usize) -> Result<Vec<Displaced>> {
         let tracker = &self.frames[index].tracker;
         uncrossed(ctx, tracker.vertices(), tracker.triangles(), displaced(&self.eased(index)))
