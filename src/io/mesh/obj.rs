@@ -13,7 +13,7 @@ use crate::io::files::{source, text};
 const EMPTY: &[u8] = b"# an empty mesh\n";
 /// Lines between two checks of the stop flag.
 const PIECE: usize = 1 << 14;
-/// Names of the arrays for the three numbers after a vertex' position.
+/// Names of the arrays for the three numbers after a vertex's position.
 const COLOURS: [&str; 3] = ["red", "green", "blue"];
 
 /// Reads positions, minus an origin that is subtracted in 64 bits, faces and texture coordinates. Other lines may have any encoding.

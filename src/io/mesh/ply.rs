@@ -12,7 +12,7 @@ use crate::io::files::{source, text};
 
 pub(in crate::io) use super::ply_header::{Element, NAMES};
 
-/// Names of a vertex' texture coordinates.
+/// Names of a vertex's texture coordinates.
 pub(in crate::io) const UV_NAMES: [[&str; 2]; 3] = [["s", "t"], ["u", "v"], ["texture_u", "texture_v"]];
 
 /// Properties that do not become arrays: positions and normals.

@@ -293,7 +293,7 @@ impl Part {
 }
 
 impl FileVertices {
-    /// Adds a copy of some vertices and of the triangles over them; `shift` is the index of a moving vertex' copy minus that of the vertex.
+    /// Adds a copy of some vertices and of the triangles over them; `shift` is the index of a moving vertex's copy minus that of the vertex.
     fn copy(&mut self, vertices: Range<usize>, triangles: Range<usize>, shift: u32) {
         let by = (self.vertices.len() - vertices.start) as u32;
         for at in triangles {

@@ -20,7 +20,7 @@ use crate::motion::Motion;
 use crate::sweep::chain::{Weights, boundary};
 use crate::sweep::window::Window;
 
-/// Multiplies the number of steps with which a vertex' path in one step would be as long as the pieces that edges are split into; in
+/// Multiplies the number of steps with which a vertex's path in one step would be as long as the pieces that edges are split into; in
 /// measurements, this value gave the fewest faces and the shortest time.
 const STEP_FACTOR: f64 = 1.5;
 /// The faces that edges sweep need no more steps than would make paths of this length (cells), or than [`MAX_OVER_ARCS`] times the number
