@@ -5,11 +5,11 @@ PACKAGES := $(BUILD_PACKAGES) cmake pkg-config clang-format python3-openvdb pyth
 RUST_NEEDED := 1.89
 DEMO := target/demo
 PREFIX := /usr/local
-# Chosen together, packages have the features that the tests build them with: nothing is built twice.
+# Built together, the packages have the same features as in the tests, so that nothing is built twice.
 BUILD := cargo build --release -p frazil -p make_scenes --lib --bin frazil --bin make_scenes
 
-# The library without OpenVDB, by an invocation of its own: chosen together with the whole one it would get its features. Its archive has the same
-# name, and moves away; `$(BUILD)` puts the whole one back.
+# The library without OpenVDB, built by itself: together with the whole library it would get that one's features. Both archives have the same name,
+# so this one is copied to another folder; `$(BUILD)` puts the whole one back.
 CORE := cargo build --release -p frazil --no-default-features --lib && mkdir -p target/core && cp target/release/libfrazil.a target/core/
 
 .PHONY: setup setup-build setup-core demo test test-hosts test-core test-clients test-dist sanitize fuzz deny msrv site skinning-numbers pictures lint gates bench header install install-core hosts hosts-core dist
@@ -76,7 +76,7 @@ lint:
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps --lib
 	clang-format --dry-run -Werror cpp/*.cc cpp/*.h
 
-# What cannot run for want of data or of another program is listed at the end.
+# Tests that cannot run because data or a program is missing are listed at the end.
 test: setup
 	@mkdir -p target && rm -f target/skipped.txt
 	cargo test --release
@@ -89,12 +89,12 @@ test: setup
 header: setup
 	./tools/header include/frazil.h
 
-# The program, the C library, its header, and what finds them: make install [PREFIX=/usr/local] [DESTDIR=]
+# The program, the C library, its header, and the files by which build tools find them: make install [PREFIX=/usr/local] [DESTDIR=]
 install: setup-build
 	$(BUILD)
 	./tools/install "$(DESTDIR)$(PREFIX)"
 
-# The C library without OpenVDB: make install-core [PREFIX=/usr/local] [DESTDIR=]; the PREFIX of the whole one will do.
+# The C library without OpenVDB: make install-core [PREFIX=/usr/local] [DESTDIR=]; the PREFIX may be that of the whole library.
 install-core: setup-core
 	$(CORE)
 	./tools/install-core "$(DESTDIR)$(PREFIX)"

@@ -1,8 +1,8 @@
-//! A surface on layers beside one that only displaces the terrain (thesis Fig. 4.16): `cargo run --release --example displaced_terrain DIR`.
+//! A surface on layers, compared with one that only displaces the terrain (thesis Fig. 4.16): `cargo run --release --example displaced_terrain DIR`.
 //!
 //! Blood runs over shelves (`make_scenes` writes them). A terrain that is displaced by a depth has one height in each cell, seen from above: from the edges
-//! of shelves and around the hole it hangs down in curtains, and it shows nothing of what runs below. Into DIR come layered.png and
-//! displaced.png.
+//! of shelves and around the hole it hangs down in curtains, and it shows nothing of what runs below. Writes DIR/layered.png and
+//! DIR/displaced.png.
 
 use std::path::Path;
 
@@ -90,7 +90,7 @@ fn layered(liquid: &Shallow, ground: &TriMesh) -> Result<(TriMesh, Vec<f32>)> {
     Ok((TriMesh { positions, triangles: indices.as_chunks::<3>().0.to_vec() }, opacities))
 }
 
-/// The terrain as it is seen from above, displaced by the depth of the liquid that is there, where four cells are wet.
+/// The terrain as it is seen from above, displaced by the depth of its topmost liquid; squares between four wet cells only.
 fn displaced(liquid: &Shallow) -> (TriMesh, Vec<f32>) {
     let (columns, [nx, nz]) = (liquid.columns(), liquid.columns().grid.size);
     let (mut mesh, mut opacities) = (TriMesh::default(), Vec::new());

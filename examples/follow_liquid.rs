@@ -1,8 +1,8 @@
 //! A detailed mesh follows the particles of a liquid: `cargo run --release --example follow_liquid DIR`.
 //!
 //! Two balls of particles meet and become one. The mesh begins as the surface of the particles of the first frame, and keeps its vertices
-//! but where the liquid merges; DIR/liquid.NNNN.ply are the frames. With a mesh of your own that fits the first frame's particles, its detail
-//! comes along.
+//! except where the liquid merges; DIR/liquid.NNNN.ply are the frames. A mesh of your own that fits the first frame's particles carries its
+//! detail along.
 
 use std::path::Path;
 

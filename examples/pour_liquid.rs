@@ -17,7 +17,7 @@ use frazil::{Context, Error, Pool, Result};
 
 /// Edge of a cell (m).
 const CELL: f64 = 0.001;
-/// Seconds, and frames in one.
+/// Seconds, and frames per second.
 const SECONDS: usize = 4;
 const RATE: usize = 60;
 

@@ -1,15 +1,15 @@
 //! What a step does where a liquid merges, in meshes to look at: `cargo run --release --example surface_stages DIR`.
 //!
-//! Two balls of particles meet under a mesh with ripples. The step in which they become one is taken apart, as a program may that
-//! follows a liquid of its own: [`Tracker::step`] says in a [`Change`] which triangles are still there, which are parts of others, and
-//! which are new. Into DIR come
+//! Two balls of particles meet under a mesh with ripples. The step in which they become one is taken apart, as a program that follows
+//! its own liquid may do: [`Tracker::step`] says in a [`Change`] which triangles stay, which are parts of old ones, and which are new. These
+//! files are written to DIR:
 //!
 //! | file | holds |
 //! |---|---|
 //! | flagged.ply | the mesh before the change, its triangles with flagged vertices darker |
-//! | cells.ply | the cells of the grid in which anything goes or is made |
+//! | cells.ply | the cells of the grid in which triangles are removed or made |
 //! | cut.ply | what stays of the mesh; parts of triangles are darker |
-//! | made.ply | the mesh after it; what was made is darkest |
+//! | made.ply | the mesh after the change; new triangles are darkest |
 //! | liquid.bgeo | the particles |
 //!
 //! `frazil preview DIR/made.ply --color stage -o made.png --eye 0.03,0.03,0.1 --target 0,0,0 --fov 34` draws one of them.
@@ -36,11 +36,11 @@ const SPEED: f64 = 0.22;
 const DT: f64 = 1.0 / 24.0;
 /// The balls have met long before this frame.
 const LAST: i32 = 24;
-/// Numbers `stage` of triangles: those that stay, parts of such, and those that were made.
+/// Values of the array `stage`: triangles that stay, parts of old triangles, and new triangles.
 const KEPT: f64 = 1.0;
 const PART: f64 = 0.72;
 const MADE: f64 = 0.5;
-/// How much they differ, to tell triangles from their neighbours.
+/// How much these values vary, to tell triangles from their neighbours.
 const SHADE: f64 = 0.2;
 
 fn main() -> frazil::Result<()> {
@@ -56,10 +56,10 @@ fn main() -> frazil::Result<()> {
         let before = tracker.clone();
         let to = liquid(&ball, frame);
         let report = tracker.step(&ctx, &from, &to, DT)?;
-        // A body without a hole through it counts 2.
+        // The Euler characteristic of one body without a hole through it is 2.
         let is_one = tracker.mesh().euler_characteristic() == 2;
         if is_one && let Some(change) = &report.change {
-            // A mesh that is not rebuilt goes the same way, and says where it no longer fits.
+            // The same step without rebuilding flags the vertices at which the mesh no longer fits.
             let flagging = Params { rebuild: false, ..params };
             let mut flagged = Tracker::resume(flagging, &first, &before.save())?;
             flagged.step(&ctx, &from, &to, DT)?;
@@ -81,9 +81,9 @@ fn main() -> frazil::Result<()> {
 
 /// A step that changed a mesh.
 struct Step<'a> {
-    /// Those before it.
+    /// The triangles before the step.
     triangles: &'a [[u32; 3]],
-    /// Of each vertex before it, whether the mesh no longer fits there.
+    /// For each vertex before the step, whether the mesh no longer fits there.
     flags: &'a [bool],
     change: &'a Change,
 }
@@ -100,7 +100,7 @@ impl Step<'_> {
         drawing
     }
 
-    /// The mesh after the change, without what was made or with it.
+    /// The mesh after the change, with or without the new triangles.
     fn after(&self, with_made: bool) -> Drawing {
         let mut drawing = Drawing::default();
         for (n, (corners, source)) in self.change.triangles.iter().zip(&self.change.sources).enumerate() {
@@ -116,7 +116,7 @@ impl Step<'_> {
         drawing
     }
 
-    /// The outer faces of the cells in which triangles lie that the step took away or made.
+    /// The outer faces of the cells with triangles that the step removed or made.
     fn cells(&self) -> Drawing {
         let mut is_gone = vec![true; self.triangles.len()];
         let mut cells = BTreeSet::new();
@@ -155,13 +155,13 @@ impl Step<'_> {
         corners.map(|corner| self.change.before[corner as usize])
     }
 
-    /// And those of one after it.
+    /// The corners of a triangle after the change (m).
     fn now(&self, corners: [u32; 3]) -> [DVec3; 3] {
         corners.map(|corner| self.change.vertices[corner as usize])
     }
 }
 
-/// The cells in which a triangle lies, as far as some places on it tell.
+/// The cells through which a triangle passes, found by sampling it.
 fn cells_of([a, b, c]: [DVec3; 3]) -> Vec<[i32; 3]> {
     const PARTS: usize = 4;
     let share = |n: usize| (n as f64 + 1.0 / 3.0) / PARTS as f64;
@@ -174,16 +174,16 @@ fn cells_of([a, b, c]: [DVec3; 3]) -> Vec<[i32; 3]> {
     pairs.map(cell).collect()
 }
 
-/// A part of [`SHADE`] for a triangle.
+/// A pseudo-random part of [`SHADE`] for a triangle.
 fn shade(number: usize) -> f64 {
     SHADE * (0.618_034 * number as f64).fract()
 }
 
-/// Faces with a number each.
+/// Faces, each with a number.
 #[derive(Default)]
 struct Drawing {
     mesh: TriMesh,
-    /// Of its vertices: faces have none in common.
+    /// The number for each vertex; faces share no vertices.
     stage: Vec<f64>,
 }
 
@@ -197,7 +197,7 @@ impl Drawing {
     }
 
     fn write(mut self, path: &Path) -> frazil::Result<()> {
-        // A picture's colours go from the least number to the greatest: a triangle without a size has 0 and 1.
+        // A picture's colours go from the least number to the greatest, so a degenerate triangle with 0 and 1 is added.
         let first = self.mesh.positions.len() as u32;
         let position = self.mesh.positions.first().copied().unwrap_or_default();
         self.mesh.positions.extend([position; 3]);
@@ -235,7 +235,7 @@ fn middle(side: f64, frame: i32) -> DVec3 {
     DVec3::new(side * (RADIUS + 2.0 - SPEED * f64::from(frame)), 0.0, 0.0)
 }
 
-/// The particles of both balls at a frame, by whose ids each is the same in all of them.
+/// The particles of both balls at a frame. A particle has the same id in all frames.
 fn liquid(ball: &[DVec3], frame: i32) -> Particles {
     let half = |side: f64| ball.iter().map(move |position| (position + middle(side, frame)) * SPACING);
     let positions: Vec<DVec3> = half(-1.0).chain(half(1.0)).collect();
@@ -257,7 +257,7 @@ fn first_mesh() -> TriMesh {
     both
 }
 
-/// Directions and triangles of a sphere: an octahedron whose triangles are divided in four, so often.
+/// Directions and triangles of a sphere: an octahedron whose triangles are divided into four, `times` times.
 fn sphere(times: usize) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let mut positions = vec![DVec3::x(), -DVec3::x(), DVec3::y(), -DVec3::y(), DVec3::z(), -DVec3::z()];
     let mut triangles: Vec<[u32; 3]> =

@@ -3,8 +3,8 @@
     blender -b --factory-startup --python examples/blender/render_shot.py -- cache/ 48 frame.png --eye 2,1.2,2 --target 0,0.2,0
 
 The shot needs `[output] grains = ["vdb", "ply"]`, as Blender reads no points from .vdb files; with `mesh = ["ply"]` the base is
-that mesh, else Blender meshes base/*.vdb itself. With `objects = ["ply"]` the objects are there too. What a shot does not have is
-left out. Without -b the scene stays open, to light and shade it further. Places are metres with Y up, as everywhere in frazil.
+that mesh, else Blender meshes base/*.vdb itself. With `objects = ["ply"]` the objects are drawn too. What a shot does not have is
+left out. Without -b the scene stays open, to light and shade it further. Positions are in metres with Y up, as everywhere in frazil.
 """
 
 import argparse
@@ -21,7 +21,7 @@ KINDS = {"float": "<f4", "double": "<f8", "uchar": "u1", "char": "i1", "int": "<
 
 
 def arguments():
-    """What stands behind the two dashes."""
+    """The arguments after the two dashes."""
     parser = argparse.ArgumentParser(prog="render_shot.py", description=__doc__.splitlines()[0])
     place = lambda text: tuple(float(number) for number in text.split(","))  # noqa: E731
     parser.add_argument("folder", type=pathlib.Path)
@@ -182,7 +182,7 @@ def main():
     snow = material("snow", "ShaderNodeBsdfPrincipled", Base_Color=(0.9, 0.92, 0.95, 1.0), Roughness=0.7)
     skin = material("object", "ShaderNodeBsdfPrincipled", Base_Color=(0.16, 0.13, 0.11, 1.0), Roughness=0.6)
     fog = material("mist", "ShaderNodeVolumePrincipled", Color=(0.96, 0.97, 1.0, 1.0), Density=asked.mist, Anisotropy=0.3)
-    # What is there, and how it gets into the scene; the first of a kind counts.
+    # The files of each part, and what adds them to the scene; of a part, the first file that exists is used.
     parts = [
         ("base", file("mesh", "ply"), lambda path: mesh_of("base", path, root, snow)),
         ("base", file("base", "vdb"), lambda path: base_of_volume(path, root, snow)),

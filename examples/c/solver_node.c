@@ -52,7 +52,7 @@ static frz_status step(frz_context *ctx, frz_base *base, int frame) {
     static const uint32_t quads[24] = {0, 4, 6, 2, 1, 3, 7, 5, 0, 1, 5, 4, 2, 6, 7, 3, 0, 2, 3, 1, 4, 5, 7, 6};
     float from[8][3], to[8][3];
     frz_body body;
-    animated_box((float)(frame == FIRST ? frame : frame - 1), from); /* the first frame has no way behind it */
+    animated_box((float)(frame == FIRST ? frame : frame - 1), from); /* there is no motion before the first frame */
     animated_box((float)frame, to);
     memset(&body, 0, sizeof body);
     body.struct_size = sizeof body;

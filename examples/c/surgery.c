@@ -1,6 +1,6 @@
 /* A wound in real time, on the core library alone: a knobbly bone in soft tissue that breathes, three bleeders of which one pulsates, a suction
- * drain, gauze that fills up, and an instrument that moves through the blood. 60 frames a second; prints the milliseconds of each part of a
- * frame (time of this thread), on average and at worst.
+ * drain, gauze that fills up, and an instrument that moves through the blood, at 60 frames per second. Prints the milliseconds of each
+ * part of a frame (CPU time of this thread), on average and at worst.
  *
  *   cc -O2 surgery.c $(pkg-config --cflags --libs frazil_core) -lm -o surgery && ./surgery [FRAMES]
  */
@@ -20,7 +20,7 @@
 enum {
     FPS = 60,
     BREATH = 240, /* frames of a breath */
-    SWEEP = 480,  /* frames in which the instrument comes back */
+    SWEEP = 480,  /* frames until the instrument is back at its start */
     ACROSS = 120, /* cells of 1 mm along x and z */
     ALONG = 80,
     TISSUE = 48,   /* vertices along a side of the tissue */
@@ -128,7 +128,7 @@ static void make_bone(wound *self) {
     }
 }
 
-/* The triangle of the bone that is nearest to a place and faces up. */
+/* The triangle of the bone that is nearest to a position and faces up. */
 static uint32_t triangle_near(const wound *self, double x, double z) {
     uint32_t triangle, best = 0;
     double nearest = 1;
@@ -211,7 +211,7 @@ static double now(void) {
     return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
 }
 
-/* The tissue and the bone in it rise and sink; only the middle does, and so only that is made anew. */
+/* The tissue and the bone in it rise and sink, but only in the middle, so only that part is made anew. */
 static void breathe(wound *self, int frame) {
     static const double BOUNDS[4] = {-0.05, -0.03, 0.05, 0.03};
     const double lift = 0.0008 * sin(2 * PI * (frame % BREATH) / BREATH);
@@ -262,7 +262,7 @@ static void draw(wound *self) {
     must(frz_shallow_snapshot_surface(self->ctx, self->shown, NULL, &target, &self->drawn));
 }
 
-/* One frame: what moves, what flows, what is shown. The blood has 8 ms for it, of some 16. */
+/* One frame: what moves, what flows, what is shown. The blood may take 8 of the frame's 16 ms. */
 static void wound_frame(wound *self, int frame) {
     double times[PARTS + 1];
     int part;

@@ -1,6 +1,6 @@
 /* A cup of coffee with milk is spilled over a table with a groove, and falls over its edge: frazil's core library from C#, as in a game, at 60
- * frames per second; the surface, with the share of milk in each vertex, and the drops in the air come as Unity takes them (Y up, left-handed, clockwise)
- * into arrays that are allocated once.
+ * frames per second. The surface, with the share of milk in each vertex, and the drops in the air are written as Unity takes them (Y up,
+ * left-handed, clockwise) into arrays that are allocated once.
  *
  *   mcs -optimize -out:spill.exe Spill.cs && LD_LIBRARY_PATH=PREFIX/lib mono spill.exe
  */
@@ -115,7 +115,7 @@ static class Frazil {
     [DllImport(Library)]
     public static extern uint frz_shallow_surface(IntPtr context, IntPtr shallow, ref Layout layout, ref Target target, ref Size size);
 
-    /// <summary>What fails is an exception with the library's sentence.</summary>
+    /// <summary>Turns a failure into an exception with the library's message.</summary>
     public static void Must(uint status) {
         if (status != 0) throw new InvalidOperationException(Marshal.PtrToStringAnsi(frz_last_error()));
     }

@@ -1,6 +1,6 @@
 //! A drop that hangs from a ball by a neck: it falls, the neck is drawn out to a thread and tears, and the drop comes down on a pool
-//! and spreads. Where each position of it goes is a formula that keeps volumes, but where the thread tears. Lengths are in spacings, but
-//! for what is written.
+//! and spreads. A formula that keeps volumes, except where the thread tears, moves each position. Lengths are in spacings, except in
+//! the files.
 
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
@@ -26,9 +26,9 @@ const DROP: f64 = 6.5;
 const NECK: f64 = 3.2;
 /// Half of the neck's length.
 const HALF: f64 = 5.0;
-/// How far the drop falls; a spacing farther down begins the pool.
+/// How far the drop falls; the pool begins one spacing below that.
 const FALL: f64 = 10.0;
-/// Acceleration of its fall (1/s2): 0.4 m/s2, in slow motion.
+/// Acceleration of its fall (spacings/s2): 0.4 m/s2, in slow motion.
 const GRAVITY: f64 = 32.0;
 /// Radius and half of the height of the pool. Its highest position is the origin.
 const POOL: [f64; 2] = [15.0, 4.0];
@@ -67,7 +67,7 @@ pub fn write(folder: &Path) -> frazil::Result<()> {
 
 /// The particles at the first frame.
 fn positions(hanging: &Outline) -> Vec<DVec3> {
-    // On a grid that is turned: the thread would tear along the planes of one that is not.
+    // On a rotated grid: on an unrotated one, the thread would tear along the planes of the grid.
     let set = |position: DVec3| turned(position, 0.7, DVec3::new(0.0, 20.0, 0.0));
     // The surface of particles lies half a spacing above the outermost.
     let is_inside = |position: DVec3| {
@@ -87,7 +87,7 @@ fn middle() -> f64 {
     FALL + 1.0 + DROP + (DROP * DROP - NECK * NECK).sqrt() + HALF
 }
 
-/// Where a position of the first frame is at another.
+/// Where a position of the first frame has moved by another frame.
 fn moved(position: DVec3, frame: i32) -> DVec3 {
     if position.y < 0.0 {
         return position;
@@ -95,11 +95,11 @@ fn moved(position: DVec3, frame: i32) -> DVec3 {
     let time = f64::from(frame - 1) / FPS;
     let contact = (2.0 * FALL / GRAVITY).sqrt();
     let fallen = 0.5 * GRAVITY * time.min(contact) * time.min(contact);
-    // How much of the neck is drawn out, on both sides of its middle: all of it at first, then ever less, which becomes the thread.
+    // Half the length of the part of the neck that is drawn out: all of the neck at first, then ever less, which becomes the thread.
     let drawn = HALF * (1.0 - 0.94 * smooth(time / (0.85 * contact)));
     let along = ((drawn + middle() - position.y) / (2.0 * drawn)).clamp(0.0, 1.0);
     let share = smooth(along);
-    // As much thinner as it is longer.
+    // Thinner where it is longer, so that the volume stays the same.
     let thinner = 1.0 / (1.0 + fallen * 6.0 * along * (1.0 - along) / (2.0 * drawn)).sqrt();
     let (x, y, z) = (position.x * thinner, position.y - fallen * share, position.z * thinner);
     // What has come down with the drop spreads.
@@ -109,14 +109,14 @@ fn moved(position: DVec3, frame: i32) -> DVec3 {
     DVec3::new(x * wider, y * lower, z * wider)
 }
 
-/// From 0 to 1 without a corner while `part` does so.
+/// A smooth step from 0 to 1 while `part` goes from 0 to 1.
 fn smooth(part: f64) -> f64 {
     let part = part.clamp(0.0, 1.0);
     part * part * (3.0 - 2.0 * part)
 }
 
 /// The outline of a body of revolution about the y axis, from its upper end to its lower one: distances from the axis, and heights.
-/// Points are evenly apart, and heights become less.
+/// Points are evenly spaced, and heights decrease.
 struct Outline(Vec<[f64; 2]>);
 
 impl Outline {
@@ -158,8 +158,8 @@ impl Outline {
         between(above, below, (above[1] - height) / (above[1] - below[1]))[0]
     }
 
-    /// Its body, of so many columns and rings, with waves of a height: so many around, which turn so often from end to end. And the
-    /// wave of each vertex, -1 to 1.
+    /// The mesh of the body, with `columns` and `rings`, and with `around` waves of this height around it, which make `turns` turns from
+    /// end to end; also the wave of each vertex, -1 to 1.
     fn sculpted(
         &self,
         [columns, rings]: [usize; 2],
@@ -189,8 +189,8 @@ impl Outline {
     }
 }
 
-/// An arc of an ellipse around a height on the axis, with half of its width and height, from one angle to another (rad): 0 is its
-/// upper end, pi the lower one.
+/// An arc of an ellipse from one angle to another (rad; 0 is its upper end, pi the lower one). Its centre is on the axis at the height
+/// `middle`; `width` and `height` are half of its width and height.
 fn arc(middle: f64, [width, height]: [f64; 2], [from, to]: [f64; 2]) -> Vec<[f64; 2]> {
     let point = |n: usize| {
         let (sine, cosine) = libm::sincos(from + (to - from) * n as f64 / PIECES as f64);
@@ -199,7 +199,7 @@ fn arc(middle: f64, [width, height]: [f64; 2], [from, to]: [f64; 2]) -> Vec<[f64
     (0..=PIECES).map(point).collect()
 }
 
-/// A line in pieces of the same length, from points on it none of which are the same.
+/// The line through points, no two of which coincide, divided into pieces of the same length.
 fn even(line: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut so_far = vec![0.0];
     for pair in line.windows(2) {

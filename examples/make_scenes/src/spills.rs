@@ -5,14 +5,14 @@ use std::path::Path;
 use frazil::geometry::{TriMesh, Vec3};
 use frazil::io::mesh;
 
-/// Writes them.
+/// Writes their meshes.
 pub fn write(folder: &Path) -> frazil::Result<()> {
     mesh::write(&folder.join("incline.obj"), &incline())?;
     mesh::write(&folder.join("shelves.obj"), &shelves())?;
     mesh::write(&folder.join("bowl.obj"), &bowl())
 }
 
-/// A sheet over a rectangle around the origin, of edges (m), of so many points along each.
+/// A sheet over a rectangle around the origin, with these edges (m) and this many points along each.
 pub fn sheet(edges: [f32; 2], points: [u32; 2], height: impl Fn(f32, f32) -> f32) -> TriMesh {
     let [nx, nz] = points;
     let position = |index: u32| {
@@ -29,7 +29,7 @@ pub fn sheet(edges: [f32; 2], points: [u32; 2], height: impl Fn(f32, f32) -> f32
     TriMesh { positions: (0..nx * nz).map(position).collect(), triangles }
 }
 
-/// 10 x 10 cm that fall by 35 % along x, with low bumps that part the liquid.
+/// A plane of 10 x 10 cm that falls by 35 % along x, with low bumps that part the liquid.
 fn incline() -> TriMesh {
     let sine = |phase: f32| libm::sinf(phase);
     sheet([0.1; 2], [201; 2], |x, z| {
@@ -38,12 +38,12 @@ fn incline() -> TriMesh {
     })
 }
 
-/// 6.4 cm wide, 2 cm deep, with a rim.
+/// A bowl 6.4 cm wide and 2 cm deep, with a rim.
 fn bowl() -> TriMesh {
     sheet([0.08; 2], [161; 2], |x, z| {
         let from_middle = (x * x + z * z).sqrt();
         let inside = 20.0 * from_middle * from_middle;
-        // Outside it falls a little.
+        // Outside of the rim the ground falls a little.
         inside.min(0.0205 - 0.15 * (from_middle - 0.032))
     })
 }
@@ -57,7 +57,7 @@ fn shelves() -> TriMesh {
     for [x0, x1, z0, z1] in walls([0.05; 2], 0.003) {
         put([x0, 0.0, z0], [x1, 0.012, z1]);
     }
-    // The platform around its hole, whose corners are pillars' heads, and its rim.
+    // The platform around its hole, and its rim.
     let (outer, hole) = (0.032, 0.011);
     for [x0, x1, z0, z1] in walls([outer; 2], outer - hole) {
         put([x0, 0.020, z0], [x1, 0.023, z1]);
@@ -65,13 +65,13 @@ fn shelves() -> TriMesh {
     for [x0, x1, z0, z1] in walls([outer; 2], 0.002) {
         put([x0, 0.020, z0], [x1, 0.026, z1]);
     }
-    // It tilts nowhere: liquid falls through the hole, or over the rim where that is cut.
+    // Pillars under its corners. It is level: liquid falls through the hole, or over the rim.
     for x in [-0.028, 0.028] {
         for z in [-0.028, 0.028] {
             put([x - 0.002, 0.0, z - 0.002], [x + 0.002, 0.0225, z + 0.002]);
         }
     }
-    // The smallest, without a rim, beside the hole.
+    // The smallest platform, without a rim, and its pillar.
     put([-0.026, 0.038, -0.010], [0.004, 0.041, 0.010]);
     put([-0.022, 0.020, -0.002], [-0.018, 0.040, 0.002]);
     mesh

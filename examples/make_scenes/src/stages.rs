@@ -1,4 +1,4 @@
-//! The stages of spills in pictures: a bone in its bed, bars over a tray, a staircase, a hollow with a gauze on it.
+//! The terrains of the spills in pictures: a bone in its bed, bars over a tray, a staircase, a hollow, and gauze that lies in it.
 
 use std::f32::consts::TAU;
 use std::path::Path;
@@ -8,7 +8,7 @@ use frazil::io::mesh;
 
 use super::spills::{sheet, walls};
 
-/// Writes them.
+/// Writes their meshes.
 pub fn write(folder: &Path) -> frazil::Result<()> {
     mesh::write(&folder.join("bone.obj"), &bone())?;
     mesh::write(&folder.join("grating.obj"), &grating())?;
@@ -21,14 +21,14 @@ fn sine(phase: f32) -> f32 {
     libm::sinf(phase)
 }
 
-/// How far a number is from one edge to another, 0 to 1, without kinks.
+/// A smooth step from 0 at `low` to 1 at `high`.
 fn between(low: f32, high: f32, number: f32) -> f32 {
     let part = ((number - low) / (high - low)).clamp(0.0, 1.0);
     part * part * (3.0 - 2.0 * part)
 }
 
-/// A tube along x with closed ends, of so many points along and around; `ring` has the middle and the radius at a share of its length, `bump` what
-/// the radius is multiplied with there, at an angle.
+/// A tube along x with closed ends and `along` x `around` points. `ring` gives its middle and radius at a share of its length, `bump` a factor of
+/// the radius at that share and an angle.
 fn tube(
     [along, around]: [u32; 2],
     ring: impl Fn(f32) -> (Vec3, f32),
@@ -70,7 +70,7 @@ fn bone() -> TriMesh {
         let hollow = 0.016 * (between(0.012, 0.040, z.abs()) + 0.6 * between(0.035, 0.058, x.abs()));
         let folds =
             sine(95.0 * x + 40.0 * z) * sine(120.0 * z - 1.0) + 0.5 * sine(210.0 * x - 130.0 * z + 2.0);
-        // It falls a little towards the position of the suction.
+        // The bed falls a little towards the position of the suction.
         hollow + 0.0006 * folds - 0.02 * x
     });
     let knob = |share: f32, at: f32, wide: f32| {
@@ -127,7 +127,7 @@ fn grating() -> TriMesh {
             [2, 40],
             |share| (Vec3::new(0.08 * (share - 0.5), 0.036, 0.0), 0.0026),
             |_, angle| {
-                // A flat top, as of bars that are worn.
+                // A flat top, like that of a worn bar.
                 let up = libm::cosf(angle);
                 if up > 0.8 { 0.8 / up } else { 1.0 }
             },
