@@ -76,7 +76,7 @@ impl Triangle {
         best.0
     }
 
-    /// Offsets from the nearest points to eight points: the kernel, inlined for each instruction set.
+    /// Offsets of eight points from the triangle's points nearest to them: the kernel, inlined for each instruction set.
     #[inline(always)]
     fn offsets(&self, points: &Points) -> Offsets {
         let p = [Lanes(points.x), Lanes(points.y), Lanes(points.z)];

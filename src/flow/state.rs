@@ -24,7 +24,7 @@ const MAX_COORD: i32 = 1 << 26;
 const TILE: usize = 4 * 512;
 
 impl FlowState {
-    /// Copies the persistent state of a flow. Reuses its own memory.
+    /// Copies the persistent state of a flow into the memory that this state holds.
     pub fn copy_from(&mut self, flow: &Flow) {
         self.tiles.clone_from(&flow.tiles);
         for (to, from) in self.velocity.iter_mut().zip(&flow.velocity) {

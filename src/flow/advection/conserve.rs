@@ -19,8 +19,8 @@ use crate::flow::window::{max, min};
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::Lanes;
 
-/// Largest factor of a hat, and then of all density, in a round: if nearly all the mist of a tile was cut off, its mass must not return in
-/// the remainder.
+/// Largest factor of a hat, and then of all density, in a round: if nearly all the mist of a tile was removed, its mass must not return in
+/// the little that is left.
 const MAX_GAIN: f64 = 1.2;
 /// Passes in which a hat that would have to grow by more than [`MAX_GAIN`] hands the excess to the adjacent hats. The excess that remains
 /// after them is spread over all of the density.

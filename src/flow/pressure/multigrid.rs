@@ -16,7 +16,7 @@ use crate::flow::scratch::first_tiles;
 use crate::flow::solids::Solids;
 use crate::flow::tiles::{Field, NONE, Tile, Tiles};
 
-/// Weights of two Jacobi sweeps: the inverse roots of the Chebyshev polynomial on [1/3, 2], the range of eigenvalues (over the diagonal) of
+/// Weights of two Jacobi sweeps: 1 over the roots of the Chebyshev polynomial on [1/3, 2], the range of eigenvalues (over the diagonal) of
 /// the modes that a coarser level cannot represent. At most 0.34 of these modes remains.
 const WEIGHTS: [f32; 2] = [1.731_9, 0.569_5];
 /// Pairs of sweeps on the coarsest level.
@@ -78,7 +78,7 @@ impl Multigrid {
         self.levels.truncate(count);
     }
 
-    /// x = M b; returns the sum of x times b.
+    /// Applies the preconditioner M: x = M b. Returns the sum of x times b.
     pub fn cycle(&mut self, b: &[Tile], x: &mut [Tile], scratch: [&mut [Tile]; 2]) -> f64 {
         descend(&self.finest, &mut self.levels, b, x, scratch)
     }

@@ -46,7 +46,7 @@ impl Operator {
         Self::of(tiles.clone(), 0, &slots, one)
     }
 
-    /// With stencils for these slots. Stencils are large: capacity is reserved for exactly this many.
+    /// An operator with stencils for these slots. Stencils are large: capacity is reserved for exactly this many.
     fn of(tiles: Tiles, level: i32, slots: &[usize], one: impl Fn(usize) -> Stencil + Sync) -> Self {
         let mut index = vec![NONE; tiles.active()];
         slots.iter().zip(0..).for_each(|(slot, at)| index[*slot] = at);

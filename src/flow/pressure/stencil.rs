@@ -215,7 +215,7 @@ fn mean_residual_rows(near: Near<'_>, b: &Tile, out: &mut [f32; 64]) {
     }
 }
 
-/// Rows at -x, +x, -y, +y, -z, +z of a row.
+/// The rows beside a row at -x, +x, -y, +y, -z, +z.
 #[inline(always)]
 fn around(near: &Near<'_>, row: usize, own: Lanes) -> [Lanes; 6] {
     let (x, y) = (row >> 3, row & 7);

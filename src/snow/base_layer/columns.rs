@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::numeric::blocks::{BlockEdit, Mask, Origin, Values};
 use crate::vdb::{FloatGrid, Probe};
 
-/// Cells of a column block, at `x << 3 | z`.
+/// Columns of a column block; their indices are `x << 3 | z`.
 pub const CELLS: usize = 64;
 
 /// Height of snow (cells) in each column of a block.
@@ -56,7 +56,7 @@ impl Heights {
 }
 
 impl Column {
-    /// Fraction 0..=1 of the original height that is gone in each cell, when `now` is left.
+    /// Fraction 0..=1 of the original height that is gone in each column, when `now` is left.
     pub fn compression(&self, now: &Heights) -> [f32; CELLS] {
         std::array::from_fn(|cell| {
             let (original, now) = (self.original.0[cell], now.0[cell]);
@@ -78,7 +78,7 @@ pub fn add_by_cell(sums: &mut [f32; CELLS], value: impl Fn(usize) -> f32) {
     }
 }
 
-/// Cell of the column block that contains voxel `index` of a block.
+/// Index, in its column block, of the column that contains voxel `index` of a block.
 pub fn cell_of(index: usize) -> usize {
     index >> 3 & !7 | index & 7
 }

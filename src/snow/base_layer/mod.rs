@@ -217,8 +217,8 @@ impl BaseLayer {
             .into_iter()
     }
 
-    /// Blocks of the snow that the last step changed, as they were before it: the difference becomes grains. None before the first step and
-    /// after a restore.
+    /// Blocks of the snow that the last step changed, as they were before it: the difference becomes grains. Empty before the first step
+    /// and after a restore.
     pub fn before(&self) -> &[BlockEdit] {
         &self.changes.before
     }

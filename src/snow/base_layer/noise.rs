@@ -90,7 +90,7 @@ impl Displacement {
     }
 }
 
-/// Displaces a whole level set outward by noise; its band must be at least as wide as the amplitude plus a cell.
+/// Displaces a whole level set outward by noise; its band keeps its width.
 ///
 /// # Errors
 /// Parameters out of range; cancel.
@@ -99,7 +99,7 @@ pub fn displace(ctx: &Context, grid: &mut FloatGrid, params: &NoiseParams) -> Re
     params.validate(cell)?;
     let noise = Displacement::new(params, cell);
     let half_width = (f64::from(grid.background()) / cell) as f32;
-    // Rebuilt with a band that contains the displaced surface and three cells around it; from a mesh, whose positions are 32-bit, and
+    // Rebuilt with a band that contains the displaced surface and the band around it; from a mesh, whose positions are 32-bit, and
     // therefore near the world's origin.
     let (near, shift) = near_origin(ctx, grid)?;
     let mesh = level_set::to_mesh(ctx, near.as_ref().unwrap_or(grid), 0.0, 0.0)?;

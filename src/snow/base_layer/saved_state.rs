@@ -24,14 +24,14 @@ const BLOCK: usize = 2 * 4 * VOXELS + 3 * 64 + 16;
 
 /// How a block is stored; [`TOUCHED`] is added if it has frames of its last change.
 const CONSTANT: u8 = 0;
-/// The narrow band's values; all others are the background, with a sign.
+/// The narrow band's values; all others are plus or minus the background.
 const BAND: u8 = 1;
 /// All 512 values.
 const WHOLE: u8 = 2;
 const TOUCHED: u8 = 4;
 
 impl BaseLayer {
-    /// The state between two steps.
+    /// The state between two steps, as bytes.
     ///
     /// # Errors
     /// Cancel; when memory runs out.

@@ -210,7 +210,7 @@ impl Heap {
         layout
     }
 
-    /// Stores the data of a layout that the next step needs; removes the grains that have left its range.
+    /// Stores the data of a layout that the next step needs; removes the grains that have left the range of blocks.
     fn store_layout(&mut self, mut layout: Layout) -> Result<()> {
         self.pair_impulses = layout.take_impulses();
         self.touches = layout.blocks.iter().flat_map(|block| block.touches.iter().copied()).collect();

@@ -95,7 +95,7 @@ pub struct StepReport {
     pub owed: f64,
     /// Count of grains removed below the lowest height, outside [`Params::keep_box`] or beyond the range of coordinates.
     pub dropped: usize,
-    /// Of these, count of grains that fell below the lowest height, beyond the edge of ground.
+    /// Of these, count of grains that fell below the lowest height, beyond the edge of the ground.
     pub fell: usize,
     /// Count of grains that reached [`Params::lifetime`].
     pub expired: usize,

@@ -154,7 +154,7 @@ impl Params {
     }
 }
 
-/// Friction between loose grains that slide over each other, as a share of that between grains that do not yet.
+/// Friction between loose grains that slide over each other, as a share of that between grains that do not slide yet.
 const SLIDING_SHARE: f64 = 0.8;
 /// Square of the speed above which a grain slides, in diameters times gravity: the speed is a tenth of that at which it could rise by half
 /// a diameter.

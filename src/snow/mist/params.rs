@@ -19,7 +19,7 @@ pub struct Params {
     pub gravity: f64,
     /// Time (s) in which half of the mist dissipates; infinite: it stays.
     pub half_life: f64,
-    /// Velocity (m/s) of the air.
+    /// Velocity (m/s) of the surrounding air.
     pub wind: [f64; 3],
     /// Acceleration (m/s2, root mean square) of the air by eddies; 0: none.
     pub turbulence: f64,

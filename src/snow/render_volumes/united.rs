@@ -16,15 +16,15 @@ use crate::vdb::{FloatGrid, Probe};
 /// Maximum voxel size (radii of a grain): spheres with a radius of less than one and a half voxels are lost between the voxels.
 const VOXEL: f64 = 1.0 / 1.5;
 /// Radius with which a grain becomes part of the surface (radii): grains touch only in points, which no grid can represent. Grown by a
-/// quarter, two touching grains share a neck of three quarters of a radius, and a grain a tenth of a diameter above the base is joined to
-/// it.
+/// quarter, two touching grains share a neck with a radius of 0.75, and a grain a tenth of a diameter above the base is
+/// joined to it.
 const GROWN: f64 = 1.25;
 /// Half width of the narrow band (voxels).
 const HALF_WIDTH: f32 = 3.0;
 /// Values of a leaf along an axis, plus the adjacent one of the next leaf.
 const SIDE: usize = DIM + 1;
 
-/// Number of voxels of the united surface along the edge of a base cell (m), for grains of a radius (m).
+/// Number of voxels of the united surface along the edge of a cell of the base, which is `cell` m wide, for grains of a radius (m).
 pub fn division(cell: f64, radius: f64) -> usize {
     // A quotient may be off in its last bit.
     ((cell / (VOXEL * radius)) * (1.0 - 1.0e-9)).ceil().max(1.0) as usize

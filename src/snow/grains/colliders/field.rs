@@ -104,7 +104,7 @@ impl<'a> CachedField<'a> {
         Ok(())
     }
 
-    /// Distance (diameters) of a member of the block with this index from the surface; none where no surface is near the block.
+    /// Distance (diameters) from the surface to a member of the block with this index; none if no surface is near the block.
     pub fn distance(&self, index: usize, at: BlockIndex, position: V) -> Option<f32> {
         let patch = self.patches.get(index)?.as_ref().filter(|patch| !patch.values.is_empty())?;
         Some(patch.sample(self.voxel(at, position)).0 / self.diameter as f32)

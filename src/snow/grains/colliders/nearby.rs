@@ -107,7 +107,7 @@ struct Triangles {
     sides: [V8; 2],
     /// 1 over the squared lengths of these edges and of the third one.
     inverse: V8,
-    /// The dot product with a position in the triangle's plane is the barycentric weight of the edge's end.
+    /// The dot product with a position relative to that corner is the barycentric weight of the edge's end.
     weights: [V8; 2],
     /// Of unit length.
     normal: V8,

@@ -1,4 +1,4 @@
-//! Finds the grains near meshes that move during the step: in every sub-step, block by block, among the few triangles near it.
+//! Finds the grains near meshes that move during the step: in every sub-step, block by block, among the few triangles near each.
 
 use super::nearby::Nearby;
 use super::shell::Shell;

@@ -113,7 +113,7 @@ impl Layout {
         );
     }
 
-    /// The block that owns a pair, and the impulse with its grain first; none if a grain has left.
+    /// The block that owns a pair, and the impulse with that block's grain first; none if a grain has left.
     fn with_owner(&self, held: PairImpulse) -> Option<(u32, PairImpulse)> {
         let level = |block: u32| {
             let [x, y, z] = self.blocks[block as usize].at;
@@ -226,7 +226,7 @@ impl Block {
         homes[0].block == index as u32 && homes[1].block == self.near[code]
     }
 
-    /// Maximum distance (diameters) between the anchors of a pair of a member and one of `other`.
+    /// Maximum distance (diameters) between the anchors of a pair formed by a member of this block and one of `other`.
     fn reach_to(&self, other: &Self) -> f32 {
         1.0 + 0.5 * (self.skin + other.skin)
     }

@@ -346,7 +346,7 @@ pub fn settle(row: &mut Row, at: &mut BlockIndex) {
                 *reference -= EDGE;
             }
         }
-        // A value so slightly below 0 that it, or an eighth of it, is a denormal that was flushed to 0.
+        // The position may be so slightly below 0 that it, or an eighth of it, was a denormal and was flushed to 0.
         if *position <= 0.0 {
             *position = 0.0;
         }

@@ -22,7 +22,7 @@ const MARGIN: f64 = 4.0;
 
 /// Input at the end of a step.
 pub struct StepEnd<'a> {
-    /// Positions of the grains.
+    /// Blocks of the grains.
     pub layout: &'a Layout,
     /// Diameter of a grain (m).
     pub diameter: f64,

@@ -84,7 +84,7 @@ impl<'a> Grid<'a> {
             let high = tile.map(|at| (f64::from(at + 1) * edge).ceil() as i32).map(|at| at.saturating_add(1));
             [low, high]
         });
-        // Beside and above the level set nothing is solid; below it, the enclosed solid ends.
+        // Outside the box of the level set's active voxels nothing is solid.
         let is_near = |[tile_low, tile_high]: &[[i32; 3]; 2]| {
             (0..3).all(|axis| {
                 tile_low[axis] <= high[axis].saturating_add(1)
