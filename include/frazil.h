@@ -1323,7 +1323,7 @@ typedef struct {
      */
     uint64_t kept_triangles;
     /**
-     * New triangles with an altitude below 1e-4 of an edge.
+     * New triangles with an altitude below 4e-4 of their longest edge.
      */
     uint64_t slivers;
     /**

@@ -4,11 +4,11 @@ use super::prepare::Closed;
 use crate::geometry::check::faults::counted_area;
 use crate::geometry::{DVec3, TriMesh, Vec3};
 
-/// Share of the area or of the volume below which something is missing.
+/// If less than this share of the area or of the volume is left, something is missing.
 const HALF: f64 = 0.5;
-/// Share below which nearly all is missing.
+/// If less than this share is left, nearly all is missing.
 const NEARLY_NONE: f64 = 0.1;
-/// Bounds may shrink by this share of the longest side, or by this many cells.
+/// Bounds may shrink without a warning by this share of the longest side or by this many cells, whichever is more.
 const SHRUNK: f64 = 0.05;
 const CELLS: f64 = 2.0;
 
@@ -57,15 +57,15 @@ impl Losses {
             lost.push(format!("its box has shrunk by {:.4} m on a side", self.shrunk));
         }
         if volume_now < HALF * volume {
-            lost.push(format!("of {volume:.6} m3 {volume_now:.6} are left"));
+            lost.push(format!("{volume_now:.6} of {volume:.6} m3 are left"));
         }
         // Overlapping parts lose area together with volume.
         if area_now < HALF * area && (volume_now < HALF * volume || !lost.is_empty()) {
-            lost.push(format!("of {area:.6} m2 {area_now:.6} are left"));
+            lost.push(format!("{area_now:.6} of {area:.6} m2 are left"));
         }
         (!lost.is_empty()).then(|| {
             format!(
-                "the solid is not all of the mesh: {}: what encloses nothing, or is thinner than a cell where it was rebuilt, is gone, and \
+                "the solid lacks parts of the mesh: {}: what encloses nothing, or is thinner than a cell where it was rebuilt, is gone, and \
                  parts that overlap count once",
                 lost.join(", ")
             )
@@ -76,8 +76,8 @@ impl Losses {
     pub(super) fn refusal(&self, cell: f64) -> String {
         let [area, area_now] = self.areas;
         format!(
-            "nearly all of the mesh would be lost: of {area:.6} m2 {area_now:.6} would be left in cells of {cell} m, as most of it encloses \
-             no volume (`frazil mesh check` says what it is)"
+            "nearly all of the mesh would be lost: {area_now:.6} of {area:.6} m2 would be left in cells of {cell} m, as most of it encloses \
+             no volume (`frazil mesh check` shows why)"
         )
     }
 }

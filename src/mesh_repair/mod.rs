@@ -19,7 +19,7 @@
 //! | passage, segment | where an edge of the mesh passes through a face of the grid; where a triangle does |
 //! | outer | of a face or an edge of the grid: some of the cells around it are rebuilt, and some are not |
 //! | rim | where the mesh passes through outer faces: the cut |
-//! | sound | of an outer edge: the mesh crosses it once if its ends differ, else not at all |
+//! | sound | of an outer edge: the mesh crosses it once if one of its ends is inside and the other outside, else not at all |
 //! | rebuild level | a step of the fall-backs: how much is rebuilt when less did not work |
 
 mod attributes;
@@ -82,7 +82,7 @@ pub struct RepairReport {
     pub kept_triangles: usize,
     /// Rebuild level reached: 0 the cells themselves, 1 with a ring around them, 2 the parts of the mesh that they touch, 3 everything.
     pub rebuild_level: usize,
-    /// New triangles with an altitude below 1e-4 of an edge.
+    /// New triangles with an altitude below 4e-4 of their longest edge.
     pub slivers: usize,
     /// Losses of area, volume and extent.
     pub losses: Losses,
@@ -98,8 +98,8 @@ const FACE: f64 = 256.0;
 /// Number of cell sizes tried if nothing would be left: the requested one, then half of the previous one each time.
 const HALVINGS: u32 = 6;
 
-/// Repairs a mesh in cells of an edge (m): the solid is where, with each part turned outward, the winding number is over 0. Holes are closed
-/// first. Broken parts are rebuilt within a cell of that solid; solids thinner than a cell may be lost where they are rebuilt.
+/// Repairs a mesh in cells with edges of `cell` (m): the solid is where, with each part turned outward, the winding number is over 0. Holes
+/// are closed first. Broken parts are rebuilt within a cell of that solid; solids thinner than a cell may be lost where they are rebuilt.
 ///
 /// # Errors
 /// A mesh that is not valid, or too large for the cell; one that encloses nothing, or of which nearly all would be lost; more memory than

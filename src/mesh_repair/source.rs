@@ -5,14 +5,14 @@
 pub enum Source {
     /// An unchanged triangle of the input mesh.
     Whole(u32),
-    /// A part of one.
+    /// A part of a triangle of the input mesh.
     Part(u32),
     /// Closes a hole, or was rebuilt.
     New,
 }
 
 impl Source {
-    /// The source after two changes, of which `first` has the sources of the triangles after the first.
+    /// The source after two changes; `first` holds the sources of all triangles after the first change.
     pub(crate) fn after(self, first: &[Self]) -> Self {
         match self {
             Self::Whole(triangle) => first[triangle as usize],

@@ -35,7 +35,7 @@ pub struct frz_repair_report {
     pub rebuilt_cells: u64,
     /// Triangles kept unchanged.
     pub kept_triangles: u64,
-    /// New triangles with an altitude below 1e-4 of an edge.
+    /// New triangles with an altitude below 4e-4 of their longest edge.
     pub slivers: u64,
     /// Edge of the cells (m): the one requested, or a fraction of it if nothing would have been left.
     pub cell: f64,

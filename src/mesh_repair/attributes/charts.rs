@@ -101,7 +101,7 @@ impl<'a> Charts<'a> {
         a * weights[0] + b * weights[1] + c * weights[2]
     }
 
-    /// For each of the charts' vertices, whether it existed before, or another triangle uses it too.
+    /// For each of the charts' vertices, whether it existed before, or a triangle without a chart uses it too.
     pub fn kept(&self, vertices: &[Option<u32>], triangles: &[[u32; 3]]) -> Vec<bool> {
         let mut is_kept: Vec<bool> = vertices.iter().map(Option::is_some).collect();
         for corners in self.others(triangles).map(|number| &triangles[number]) {
@@ -156,8 +156,8 @@ pub(in crate::mesh_repair) fn longest([a, b, c]: &[DVec3; 3]) -> f64 {
 /// A new triangle takes these values if the positions of all three corners are known: the corners take the values at the positions of the
 /// first mesh nearest to theirs, all on one side of a seam, and the triangle those of the triangle nearest to its middle. New vertices that
 /// only such triangles use take the values at the nearest position. A vertex that other triangles use too keeps its texture coordinates in
-/// them where they are about the same, and the new texture blends into them; where they are not, there is a seam, or, if coordinates are
-/// stored at vertices, the triangle is marked.
+/// them. Where the new ones are about the same, the new texture blends into them; where they are not, there is a seam, or, if coordinates
+/// are stored at vertices, the triangle is marked.
 #[derive(Clone, Copy)]
 pub struct Traced<'a> {
     /// The mesh at the first frame, with the attributes that it had then.

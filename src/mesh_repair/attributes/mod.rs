@@ -1,8 +1,9 @@
 //! Carries attributes and texture coordinates over to a changed mesh.
 //!
-//! Vertices and triangles that are still there keep their values bit for bit. New ones take those of a position on the old mesh: a new
-//! vertex of the nearest position, the corners of a new triangle of positions on a single old triangle, its chart, so that it never crosses
-//! a seam. Where the liquid's position at the first frame is known, the mesh of that frame is used first (`attributes/traced.rs`).
+//! Vertices and triangles that are still there keep their values bit for bit. New ones take those of positions on the old mesh: a new
+//! vertex those of the nearest position, the corners of a new triangle those of positions on a single old triangle, its chart, so that it
+//! never crosses a seam. Where the liquid's position at the first frame is known, the mesh of that frame is used instead
+//! (`attributes/traced.rs`).
 
 pub(in crate::mesh_repair) mod charts;
 mod texture;

@@ -30,8 +30,8 @@ const SWEEPS: usize = 48;
 const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 
 /// Writes the coordinates of the first frame into those that a mesh has from the previous mesh; `is_kept` is, for each of the charts'
-/// vertices, whether it existed before, or another triangle uses it too. If coordinates are stored at vertices, charted triangles with
-/// a vertex that keeps a coordinate from far away are torn.
+/// vertices, whether it existed before, or a triangle without a chart uses it too. If coordinates are stored at vertices, charted triangles
+/// with a vertex that keeps a coordinate from far away are torn.
 pub(in crate::mesh_repair) fn textured(
     charts: &mut Charts<'_>,
     first: &Uvs,
@@ -138,7 +138,7 @@ impl Texture {
             interpolated(corners, weights).map(f64::from)
         };
         let own: Vec<Pair> = charts.spots.iter().map(|spot| at(spot.triangle, &spot.weights)).collect();
-        // Largest change of coordinates over a metre of a triangle of the first mesh.
+        // Largest change of coordinates per metre on a triangle of the first mesh.
         let rate = |triangle: usize| {
             let positions = charts.first.mesh.corners(triangle);
             let corners = first.indices(triangles, triangle).map(|index| first.coordinates[index as usize]);

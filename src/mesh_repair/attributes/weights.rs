@@ -29,7 +29,7 @@ pub(in crate::mesh_repair) fn heaviest(&[a, b, c]: &Weights) -> usize {
     }
 }
 
-/// The position on a triangle that is nearest to another position (m); if it is a corner's, exactly this corner.
+/// The weights of the position on a triangle that is nearest to `position` (m); if that is a corner's, exactly those of the corner.
 pub fn weights(corners: &[DVec3; 3], position: DVec3) -> Weights {
     if let Some(corner) = corners.iter().position(|corner| *corner == position) {
         return at_corner(corner);

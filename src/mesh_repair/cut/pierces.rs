@@ -34,7 +34,7 @@ pub struct Pierces {
     items: Vec<Pierce>,
     /// The edges that each triangle passes through, ascending.
     edges: Lists<GridEdge>,
-    /// The winding number behind each pierce along z, on its line; these pierces are the last ones.
+    /// The winding number behind each pierce along z, on its line; these pierces are the last in `items`.
     behind: Vec<i32>,
 }
 
@@ -43,7 +43,7 @@ fn key((axis, node): GridEdge) -> u64 {
 }
 
 impl Pierces {
-    /// Finds them.
+    /// Finds all passages.
     pub fn of(fixed: &[Fixed], triangles: &[[u32; 3]]) -> Self {
         let faces: Vec<Face> = triangles
             .iter()
@@ -120,7 +120,7 @@ fn of_face(face: &Face, mut see: impl FnMut(GridEdge, f64, i32)) {
     let cells = face.v.map(cell_of);
     let same = [0, 1, 2].map(|axis| cells[0][axis] == cells[1][axis] && cells[1][axis] == cells[2][axis]);
     for axis in Axis::ALL {
-        // It meets a line only if it meets two planes.
+        // A face meets a line of the grid only if it meets the two planes that the line lies in.
         let [b, c] = [(axis.index() + 1) % 3, (axis.index() + 2) % 3];
         if same[b] || same[c] {
             continue;

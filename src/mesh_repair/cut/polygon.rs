@@ -28,7 +28,7 @@ pub fn polygons(shape: &Shape, triangle: u32, halves: Vec<Half>) -> Option<Vec<[
             shape.position(point).map(|position| (point, [position[x] - a[x], position[y] - a[y]]))
         };
         let ring: Vec<Corner> = ring.into_iter().map(seen).collect::<Option<_>>()?;
-        // A ring of points inside the triangle alone is a hole or an island.
+        // A ring whose points all lie inside the triangle is a hole or an island.
         let is_within = ring.iter().all(|(point, _)| matches!(point, Point::OnTriangle(..)));
         if is_within && area(&ring) < 0.0 { holes.push(ring) } else { outer.push(ring) }
     }

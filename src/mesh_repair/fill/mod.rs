@@ -35,7 +35,7 @@ impl Rim {
     /// Joins the segments of a cut.
     ///
     /// # Errors
-    /// The cells outside faces on which the segments form a closed ring, or do not join.
+    /// The cells beyond the faces on which the segments form a closed ring or do not join.
     pub fn of(cut: &Cut, set: &CellSet) -> Result<Self, Trouble> {
         let (mut paths, mut trouble) = (Vec::new(), Vec::new());
         for segments in cut.rim.chunk_by(|a, b| a.0 == b.0) {

@@ -47,7 +47,7 @@ impl Closed {
         }
     }
 
-    /// Flips triangles so that the two triangles of an edge with exactly two agree.
+    /// Flips triangles so that at each edge with exactly two triangles these agree.
     pub fn make_agree(&mut self, uses: &[Use]) {
         let area = |at: usize| normal(&self.mesh.corners(at)).norm();
         let turned = agree(&self.mesh.triangles, uses, area).turned;

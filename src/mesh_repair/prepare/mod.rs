@@ -63,8 +63,8 @@ fn collapsed(triangles: &[[u32; 3]]) -> Vec<bool> {
     triangles.iter().map(|[a, b, c]| a == b || b == c || c == a).collect()
 }
 
-/// Marks the triangles without area whose removal leaves fewer edges open. A needle between others, with one triangle on one
-/// edge and two on another, stays.
+/// Marks the triangles without area whose removal leaves fewer edges open. A needle that is alone on one edge and has one neighbour at each
+/// of the others stays.
 fn loose_needles(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<bool> {
     let mut is_out = vec![false; triangles.len()];
     let is_needle = |triangle: &[u32; 3]| is_flat(&triangle.map(|vertex| positions[vertex as usize]));

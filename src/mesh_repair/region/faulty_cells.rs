@@ -13,9 +13,9 @@ use crate::mesh_repair::cut::Shape;
 use crate::mesh_repair::cut::exact::{cell_of, cells_around, cells_beside, passages};
 use crate::mesh_repair::prepare::Closed;
 
-/// Pierces closer to each other than this are at one position (cells).
+/// Pierces closer to each other than this count as being at one position (cells).
 const SAME_POSITION: f64 = 1e-6;
-/// Minimum altitude of a triangle that closes a hole, over its longest edge.
+/// Triangles that close holes are faulty if their altitude is below this share of their longest edge.
 const MIN_ALTITUDE: f64 = 4e-4;
 
 /// The cells in which a mesh is at fault: where triangles intersect, where edges or vertices are non-manifold, where the surface does not

@@ -101,7 +101,7 @@ impl<'a> VertexRings<'a> {
         matches!(self.source(triangles[0]), Source::Part(of) if is_of(of))
     }
 
-    /// Makes a change, one of [`VertexRings::changes`] whose moving triangles are all created; returns the triangles that it touched, and whole
+    /// Makes a change: one of [`VertexRings::changes`] that moves only created triangles. Returns the triangles that it touched, and whole
     /// ones around the same vertex.
     pub fn make(&mut self, change: Change) -> Vec<u32> {
         match change {

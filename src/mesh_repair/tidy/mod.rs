@@ -35,7 +35,7 @@ const ROUNDS: usize = 3;
 struct Rule {
     /// Triangles below this quality are improved.
     below: f64,
-    /// A change must reduce the number of slivers; else it must improve the worst triangle without adding slivers.
+    /// True: a change must reduce the number of slivers; false: it must improve the worst triangle without adding slivers.
     by_count: bool,
     /// Largest displacement of a vertex (cells).
     max_displacement: f64,

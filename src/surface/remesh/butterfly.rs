@@ -46,7 +46,7 @@ impl VertexRings<'_, '_> {
             let wings = at(0, 2) + at(0, 4) + at(1, 2) + at(1, 4);
             return Some(0.5 * (self.position(a) + self.position(b)) + 0.125 * opposite - 0.0625 * wings);
         }
-        // The ends with other than 6 neighbours decide; if both have, their mean is taken.
+        // The end whose number of neighbours is not 6 decides; if both are such, their mean is taken.
         let (mut sum, mut count) = (DVec3::zeros(), 0.0);
         for (end, ring) in [a, b].into_iter().zip(&rings).filter(|(_, ring)| ring.len() != 6) {
             sum += 0.75 * self.position(end);
@@ -59,7 +59,8 @@ impl VertexRings<'_, '_> {
     }
 }
 
-/// The weight of neighbour `n`, counted from the edge's other end around a vertex, out of `of`, not 6. The sum of all weights is 1/4.
+/// The weight of neighbour `n`, counted from the edge's other end around a vertex, out of `of` neighbours, not 6. The sum of all weights is
+/// 1/4.
 fn weight(n: usize, of: usize) -> f64 {
     match (of, n) {
         (3, 0) => 5.0 / 12.0,

@@ -1,18 +1,20 @@
 //! Detects whether the mesh is strained or at rest: accumulates by how much the liquid has displaced each vertex over the last steps, which
 //! gives the change of edge lengths. Without it, edges near a limit of improvement would be remeshed forever by jittering particles.
-//! Projection is excluded: where the surface depends on few particles, as on thin sheets, it moves ten times as far as they jitter.
+//! Projection is excluded: where the surface depends on few particles, as on thin sheets, the surface moves ten times as far as they
+//! jitter.
 
 use crate::geometry::DVec3;
 
 /// Steps from one reference to the next.
 pub(in crate::surface) const WINDOW: u32 = 8;
 
-/// Displacements since a reference step; none where the mesh is not rebuilt.
+/// Displacements since a reference step; empty if the mesh is not rebuilt.
 #[derive(Debug, Clone, Default)]
 pub(in crate::surface) struct Drift {
     /// Steps since the reference, less than [`WINDOW`].
     pub steps: u32,
-    /// The displacement of each vertex (m). Vertices created since have it from their creation on.
+    /// The displacement of each vertex (m). Vertices created since then began with 0, or with the mean of the ends of the edge that they
+    /// split.
     pub vertices: Vec<[f32; 3]>,
 }
 
@@ -22,7 +24,7 @@ impl Drift {
         Self { steps: 0, vertices: vec![[0.0; 3]; vertices] }
     }
 
-    /// Displacements after a step in which the particles carried the vertices from `from` to `to` (m); it is not yet a new reference.
+    /// Displacements after a step in which the particles carried the vertices from `from` to `to` (m); the reference stays.
     pub fn after(&self, from: &[DVec3], to: &[DVec3]) -> Vec<[f32; 3]> {
         let moved = |(drift, (from, to)): (&[f32; 3], (&DVec3, &DVec3))| {
             let by = to - from;

@@ -14,7 +14,7 @@ const GAIN: f64 = 5.0;
 const FLAT: f64 = 0.866;
 
 impl VertexRings<'_, '_> {
-    /// The edge of a triangle whose flip is best. None if its angles are not small, or no flip is clearly better; the artist's own
+    /// The edge of a triangle whose flip is best. None if its angles are not small, or no flip is clearly better; edges of unchanged
     /// triangles and those at flagged vertices are not flipped.
     pub fn best_flip(&self, triangle: u32) -> Option<Edge> {
         let is_allowed = self.exists(triangle) && !self.is_whole(triangle);

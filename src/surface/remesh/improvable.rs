@@ -50,7 +50,7 @@ impl Improvable<'_> {
         is_out(self.stretch(ends)) && self.is_strained(ends)
     }
 
-    /// Whether a triangle may be due: if none of it was created or changed in this frame, only its edges are checked.
+    /// Whether a triangle may be due: if it is unchanged in this frame, only if one of its edges is out of range and not at rest.
     pub fn is_due(&self, [a, b, c]: [u32; 3], source: Source) -> bool {
         if [a, b, c].into_iter().any(|corner| self.flags[corner as usize]) {
             return false;
@@ -83,7 +83,7 @@ pub(in crate::surface::remesh) fn is_short(stretch: f64) -> bool {
     stretch < TOO_SHORT * TOO_SHORT
 }
 
-/// Longest edge that is left alone (targets). The halves of one that is split have 0.75: far from being collapsed.
+/// Longest edge that is left alone (targets). The halves of a longer one, which is split, have at least 0.75: far from being collapsed.
 pub(in crate::surface::remesh) const TOO_LONG: f64 = 1.5;
 
 /// Shortest edge that is left alone (targets).

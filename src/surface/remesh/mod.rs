@@ -10,7 +10,7 @@
 //! | word | meaning |
 //! |---|---|
 //! | size | of a vertex: the lengths of the shortest and of the longest edge around it at its birth |
-//! | target | of an edge: its range of lengths; too long refers to the lower of its ends' longest, too short to the higher of their shortest |
+//! | target | of an edge: its range of lengths, from the longer of its ends' shortest lengths to the shorter of their longest |
 //! | due | of a triangle: it may need an improvement |
 //! | near | triangles that a pass looks at |
 

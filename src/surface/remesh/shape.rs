@@ -6,7 +6,7 @@ use crate::geometry::shape::{altitude, normal};
 /// Minimum cosine between the normals of a triangle before and after a change: below it the triangle turns over.
 const UPRIGHT: f64 = 0.2;
 
-/// Altitude of a triangle on its longest edge, over that edge.
+/// Altitude of a triangle on its longest edge, divided by that edge's length.
 pub(super) fn quality(corners: &[DVec3; 3]) -> f64 {
     altitude(corners, 0.0)
 }

@@ -5,17 +5,17 @@ use super::Improvable;
 use super::improvable::{TOO_LONG, TOO_SHORT};
 use crate::geometry::DVec3;
 
-/// Change of a length since the reference from which on an edge is not at rest (targets, and [`Improvable::jitter`]). Particles at rest
-/// that jitter by 0.02 spacings change lengths by up to 0.02 targets, and by 0.01 spacings.
+/// Change of a length since the reference (targets) above which an edge is not at rest, unless it is within [`Improvable::jitter`].
+/// Particles at rest that jitter by 0.02 spacings change lengths by up to 0.02 targets, and by 0.01 spacings.
 const STRAIN: f64 = 0.04;
-/// Displacement since the reference up to which a vertex is at rest ([`Improvable::jitter`]): 0.3 spacings. On a sheet half a spacing
-/// thick, where fits extrapolate far beyond the particles, a jitter of 0.02 spacings displaces vertices by up to 0.26.
+/// Displacement since the reference up to which a vertex is at rest, in units of [`Improvable::jitter`]: 0.3 spacings. On a sheet half a
+/// spacing thick, where fits extrapolate far beyond the particles, a jitter of 0.02 spacings displaces vertices by up to 0.26.
 const STILL: f64 = 30.0;
 /// In a creeping liquid, edges change more slowly than [`STRAIN`]. So an edge is also strained each time it crosses one of a series of
 /// limits: the first is the bound of the range times the first factor, each further one the one before times the second factor.
 const BEYOND: [f64; 2] = [4.0 / 3.0, 1.5];
 /// Factor on these limits for an edge whose ends are at rest. Moving edges are split or collapsed when they reach a limit, so that edges
-/// come to rest slightly within it and jitter across it, but not as far as this one.
+/// come to rest slightly within it and jitter across it, but not as far as the limit with this factor.
 const AT_REST: f64 = 1.25;
 /// Maximum number of limits.
 const LIMITS: u32 = 64;

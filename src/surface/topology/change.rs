@@ -28,7 +28,7 @@ pub struct FlaggedMesh<'a> {
     pub flags: &'a [bool],
     /// Uncovered positions of the particles' surface that the mesh should cover (cells).
     pub uncovered: &'a [DVec3],
-    /// The check for all other cells in which it does not fit; none: it is not done.
+    /// The check for all other cells in which the mesh does not fit; none: no check.
     pub full_check: Option<FullCheck<'a>>,
 }
 
@@ -39,20 +39,20 @@ pub struct Change {
     pub vertices: Vec<DVec3>,
     /// Triangles, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// For each vertex, its vertex before the change; none: it is new.
+    /// For each vertex, its index before the change; none: it is new.
     pub origins: Vec<Option<u32>>,
     /// For each triangle, where it comes from.
     pub sources: Vec<Source>,
     /// Positions (m), after the step's motion, of the vertices that existed before the change. For several steps combined, those of the
     /// first step that changed the mesh.
     pub before: Vec<DVec3>,
-    /// For each new vertex, its signed distance from the particles' surface (m); after several steps, in the last.
+    /// For each new vertex, its signed distance from the particles' surface (m). For several steps combined, those of the last.
     pub delta: Vec<f32>,
     /// For each vertex, the lengths (m) of the shortest and of the longest edge around it at its birth.
     pub sizes: Vec<[f32; 2]>,
-    /// For each vertex, its displacement (m) since the reference of [`crate::surface::Tracker`], by which edges at rest are recognised.
+    /// For each vertex, its displacement (m) since a reference step of [`crate::surface::Tracker`], by which edges at rest are recognised.
     pub drifts: Vec<[f32; 3]>,
-    /// Counts of improvements; after several steps, of the last.
+    /// Counts of improvements. For several steps combined, those of the last.
     pub improvements: Improvements,
     /// Count of parts without particles that were removed.
     pub dry: usize,

@@ -2,7 +2,8 @@
 //! two bodies, the rim of a hole. They reveal a change before a vertex jumps there. The thesis (2.3.3) has no such early test: it misses a
 //! thread that forms between vertices, as that moves none of them.
 //!
-//! The surface is covered by the triangles of feet. Where nothing changes, these lie on it.
+//! The surface is covered by the triangles of feet: the mesh's triangles, with each vertex at its foot. Where nothing changes, these lie on
+//! the surface.
 
 use std::collections::HashMap;
 

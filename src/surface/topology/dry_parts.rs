@@ -12,7 +12,7 @@ impl Change {
     /// Removes the parts of the mesh with a volume over 0 that contain too few particles, and the hollows in them. Returns the count of
     /// parts that contained none, and of those that contained some; hollows are not counted. A mesh of one part stays.
     pub(in crate::surface) fn drop_dry(&mut self, particle_count: &ParticleCountTest<'_>) -> [usize; 2] {
-        // Mostly there is only one.
+        // Mostly there is only one part.
         if topology::parts(self.vertices.len(), &self.triangles) < 2 {
             return [0; 2];
         }
@@ -39,7 +39,8 @@ impl Change {
         if gone == [0; 2] {
             return gone;
         }
-        // Parts do not intersect, so one corner shows in which part a hollow lies. If a removed part contains another, that is removed too.
+        // Parts do not intersect, so one corner shows in which part a hollow lies. If a removed part contains another one, that one has too
+        // few particles as well.
         let corners = hollows.iter().filter_map(|hollow| self.corners(hollow).next());
         let firsts: Vec<DVec3> = corners.map(|[first, ..]| first).collect();
         let out_bounds: Vec<Bounds> = out.iter().map(|part| bounds[*part]).collect();

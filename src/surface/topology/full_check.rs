@@ -40,7 +40,7 @@ const GRAIN: usize = 2048;
 const LARGE: i64 = 512;
 /// Upper bound on the rounding of vertices (cells).
 const ROUNDED: f64 = 0.01;
-/// Maximum number of positions on a triangle along an axis.
+/// Maximum number of steps in which a triangle is sampled, in each direction.
 const POSITIONS: f64 = 4096.0;
 
 /// The check of the whole mesh.
@@ -115,7 +115,7 @@ impl Large {
     }
 }
 
-/// Triangles by block.
+/// The blocks that triangles pass through.
 #[derive(Default)]
 struct Passed {
     /// Maximum detail of corners of triangles in a block (cells).
@@ -311,7 +311,7 @@ fn raise(all: &mut BTreeMap<Coord, f32>, block: Coord, detail: f32) {
     *max = max.max(detail);
 }
 
-/// Calls `see` with positions on a triangle whose first edge is its longest, at max a cell apart.
+/// Calls `see` with positions on a triangle whose first edge is its longest, at most a cell apart.
 fn each_position([a, b, c]: [DVec3; 3], mut see: impl FnMut(DVec3)) {
     let length = (b - a).norm();
     let height = if length > 0.0 { (b - a).cross(&(c - a)).norm() / length } else { 0.0 };

@@ -3,10 +3,11 @@
 
 use crate::geometry::DVec3;
 
-/// Maximum distance from a vertex that found the surface at which others follow it (edges).
+/// Maximum distance (edges) from a vertex that found the surface up to which lost vertices follow it.
 const RINGS: usize = 16;
 
-/// Moves lost vertices (m) by the displacement since `before` of those around them, ring by ring; those with none around stay.
+/// Moves lost vertices (m) by the mean displacement, since `before`, of the vertices around them that found the surface or have been moved
+/// already, ring by ring; those that this does not reach stay.
 pub fn move_lost_vertices(
     before: &[DVec3],
     triangles: &[[u32; 3]],

@@ -115,7 +115,7 @@ impl<'a> Gamma<'a> {
         Ok(Self { shape, slots, blocks, values, changed, iterations: matched.iterations })
     }
 
-    /// Gamma at a node, where it is no longer the mesh's own.
+    /// Gamma at a node; none where it is still the mesh's own.
     fn changed(&self, node: Coord) -> Option<f32> {
         let slot = *self.slots.get(&node.map(|at| at >> 3))? as usize;
         let [x, y, z] = node.map(|at| (at & 7) as usize);
@@ -129,7 +129,7 @@ impl<'a> Gamma<'a> {
         Some(self.values[slot][offset(x, y, z)])
     }
 
-    /// Nodes that changed sides.
+    /// Nodes that changed between inside and outside.
     pub fn nodes_that_changed_sides(&self) -> impl Iterator<Item = Coord> + '_ {
         self.blocks.iter().flat_map(|block| (0..VOXELS).map(move |at| node(*block, at))).filter(|node| {
             self.changed(*node).is_some_and(|gamma| (gamma < 0.0) != (self.shape.pierces.winding(*node) > 0))

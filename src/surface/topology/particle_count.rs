@@ -163,7 +163,7 @@ pub fn is_within([low, high]: &Bounds, position: &DVec3) -> bool {
     (0..3).all(|axis| (low[axis]..=high[axis]).contains(&position[axis]))
 }
 
-/// Triangles as a mesh, with positions relative to another; each has its own corners.
+/// Triangles as a mesh, with positions relative to `position`; each triangle has vertices of its own.
 pub fn seen_from(position: DVec3, triangles: &[[DVec3; 3]]) -> TriMesh {
     TriMesh::soup(triangles.as_flattened().iter().map(|corner| (corner - position).cast()).collect())
 }

@@ -57,7 +57,7 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// Finds the parts; those with one of the feet on them are covered. `feet` are cells of phi's grid.
+    /// Finds the parts; those with one of the feet on them are covered. `feet` are the cells of phi's grid in which feet lie.
     pub fn new(phi: &Implicit, surface: &Isosurface, mut feet: Vec<Coord>) -> Self {
         feet.par_sort_unstable();
         feet.dedup();

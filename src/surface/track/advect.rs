@@ -65,7 +65,7 @@ struct Scratch {
     of_position: Near,
 }
 
-/// Carries positions (m) along the paths of particles whose spacing is `spacing` (m). Returns the count of parts.
+/// Carries positions (m) along the paths of particles whose spacing is `spacing` (m). Returns the count of parts of the frame.
 ///
 /// # Errors
 /// Particles too far apart; cancel.

@@ -1,6 +1,6 @@
-//! Easing of topology changes (thesis 2.8 wishes for it): vertices that a change will remove move towards what will replace them, a
-//! fraction of the displacement in each of the frames before it, so that a bridge does not pop up. This affects only the displayed mesh,
-//! not the tracked one.
+//! Easing of topology changes (suggested in thesis 2.8): vertices that a change will remove move towards what will replace them, a fraction
+//! of the displacement in each of the frames before it, so that a bridge does not pop up. This affects only the displayed mesh, not the
+//! tracked one.
 
 use rayon::prelude::*;
 
@@ -31,7 +31,7 @@ const MIN_WEIGHT: f64 = 1e-3;
 pub struct EasingTargets {
     /// Vertices that are removed, ascending, with their displacements (m) to what replaces them.
     displacements: Vec<(u32, DVec3)>,
-    /// The vertex that each vertex was before the step.
+    /// For each vertex after the step, the vertex that it was before.
     origins: Origins,
 }
 
@@ -120,8 +120,7 @@ fn weight(steps: usize, ahead: usize) -> f64 {
     gone * gone * (3.0 - 2.0 * gone)
 }
 
-/// The displacements (m) of the vertices that a change removes, by their index before it; a spacing, the unit of the limits, is `spacing` m
-/// long.
+/// The displacements (m) of the vertices that a change removes, by their index before it; `spacing` (m) is the unit of the limits.
 fn easing_displacements(
     ctx: &Context,
     change: &Change,

@@ -1,5 +1,5 @@
 //! Limits easing: parts of a mesh that are displaced towards their future bridge may pass through each other first. There displacements are
-//! reduced, down to 0, so that the displayed mesh intersects itself only where the mesh itself does.
+//! reduced, down to 0, so that the displayed mesh intersects itself only where the tracked mesh does.
 
 use std::collections::HashSet;
 
@@ -16,7 +16,7 @@ const HALVINGS: usize = 5;
 const ROUNDS: usize = 20;
 /// Maximum difference of the shares of neighbours after a round: no vertex is left sticking out alone.
 const STEP: f64 = 0.25;
-/// Maximum number of bins for the box of a triangle; a larger box is near everything.
+/// Maximum number of bins for the box of a triangle; a larger box counts as near everything.
 const BINS: i64 = 4096;
 /// Sentinel: the vertex is not displaced.
 const NONE: u32 = u32::MAX;
@@ -65,7 +65,7 @@ pub fn uncrossed(
 struct ReachedRegion<'a> {
     vertices: &'a [DVec3],
     displaced: &'a [Displaced],
-    /// Indices of the mesh's vertices, ascending, and the displacement of each, if it has one.
+    /// Indices of the mesh's vertices, ascending, and the index of each one's displacement, or [`NONE`].
     indices: Vec<u32>,
     slots: Vec<u32>,
     /// Triangles of these vertices.

@@ -12,8 +12,8 @@ use crate::surface::topology::change::{Change, FlaggedMesh};
 use crate::surface::tracked_mesh::Tracker;
 
 impl Tracker {
-    /// A mesh without vertices: that of frames before the first particles. If it is rebuilt, a step to particles creates it from their
-    /// surface.
+    /// A mesh without vertices: that of frames before the first particles. With `rebuild`, a step to a frame with particles makes a mesh
+    /// from their surface.
     ///
     /// # Errors
     /// Parameters out of range.

@@ -1,11 +1,11 @@
-//! Detail fades (wished for in thesis 2.8): a runny liquid does not keep what was sculpted into it.
+//! Detail fades (suggested in thesis 2.8): a runny liquid does not keep what was sculpted into it.
 //!
 //! Delta halves in a given time, and shrinks with the strain of the mesh around a vertex. Detail retention slows both; at 1 nothing fades.
 
 use crate::geometry::DVec3;
 use crate::surface::tracked_mesh::Tracker;
 
-/// The distance that each vertex keeps after a step of `dt` (s) in which its vertices are carried to `carried` (m).
+/// The distance that each vertex keeps after a step of `dt` (s) in which the vertices are carried to `carried` (m).
 pub fn fade(tracker: &Tracker, carried: &[DVec3], dt: f64) -> Vec<f32> {
     let params = &tracker.params;
     let mut delta = tracker.delta.clone();
@@ -22,7 +22,7 @@ pub fn fade(tracker: &Tracker, carried: &[DVec3], dt: f64) -> Vec<f32> {
     delta
 }
 
-/// Strain of the edges around each vertex: the mean absolute logarithm of the ratio of their lengths.
+/// Strain of the edges around each vertex: the mean absolute logarithm of the ratio of their lengths after and before the step.
 fn strains(tracker: &Tracker, carried: &[DVec3]) -> Vec<f64> {
     let mut sums = vec![(0.0, 0u32); carried.len()];
     for &[a, b, c] in &tracker.triangles {

@@ -33,7 +33,7 @@ struct ComingStep {
 
 impl Outlook {
     /// Computes the coming steps, starting at the particles `from`, at which the tracker is, each `dt` (s) after the previous one. Steps
-    /// already computed for the same particles are kept. A tracker that took a different path needs another outlook.
+    /// already computed for the same particles are kept. A tracker with a different history needs another outlook.
     ///
     /// # Errors
     /// As [`Tracker::step`]; the steps before the one that failed stay.

@@ -19,7 +19,7 @@ const TINY: f64 = 0.1;
 pub struct Foot {
     /// The position on phi = 0 (cells).
     pub position: DVec3,
-    /// Unit vector outward from it through the vertex.
+    /// Unit vector along the line through the foot and the vertex, pointing outward.
     pub outward: DVec3,
     /// Distance of the vertex (cells), negative inside.
     pub distance: f64,

@@ -17,9 +17,9 @@
 //!
 //! Far from the mesh Gamma and phi are clamped, each at its band, and their difference means little: if it were given everywhere along the
 //! rim (the border of the reach), it would distort the result at flagged nodes (between two balls by 0.1 to 0.3 at a reach of 8, by 0.02 at
-//! most with these rules). It is needed where phi alone would change a sign: without it, a drop of phi that lies across the rim would be
-//! cut in two. As a last resort a free node beside one beyond reach keeps its Gamma if its sign would change. So no edge of the grid across
-//! the rim gains or loses a crossing.
+//! most with these rules). The difference is needed where phi alone would change a sign: without it, a drop of phi that lies across the rim
+//! would be cut in two. As a last resort a free node beside one beyond reach keeps its Gamma if its sign would change. So no edge of the
+//! grid across the rim gains or loses a crossing.
 
 pub(in crate::surface) mod nodes;
 mod solve;
@@ -48,9 +48,9 @@ pub enum Solver {
 pub struct Matching {
     /// Solver of the equation.
     pub solver: Solver,
-    /// The iteration ends when no psi changes by this much (cells), over 0 (thesis: 0.01).
+    /// The iteration ends when every psi changes by less than this (cells), over 0 (thesis: 0.01).
     pub tolerance: f64,
-    /// Distance from flagged nodes, on each axis, within which it is solved (cells), at least 1; beyond, Gamma stays.
+    /// Distance from flagged nodes, on each axis, within which the equation is solved (cells), at least 1; beyond, Gamma stays.
     pub reach: i32,
     /// Maximum number of iterations.
     pub max_iterations: usize,
@@ -71,7 +71,7 @@ pub struct Matched {
     pub gamma: Vec<f32>,
     /// Count of iterations.
     pub iterations: usize,
-    /// Maximum distance of a free node's psi from the mean of those that it depends on (cells).
+    /// Maximum difference between a free node's psi and the mean psi of the nodes that it depends on (cells).
     pub residual: f64,
     /// Count of fixed nodes: those not flagged, with |Gamma| <= sqrt(3).
     pub fixed: usize,
@@ -82,7 +82,7 @@ pub struct Matched {
 }
 
 /// Matches Gamma to phi near flagged nodes. The result does not depend on the order of the nodes or the number of threads. When the
-/// iterations reach their limit, the residual shows how far the solution is from converged.
+/// iterations reach their limit, the residual shows how far the solution is from convergence.
 ///
 /// psi starts at 0 (thesis, algorithm 2.1): started from the Gamma - phi of flagged nodes, a solve that ends early would keep part of the
 /// detail to be removed. Free nodes that are not connected to a given psi through free nodes keep 0: any constant would solve their
@@ -417,7 +417,7 @@ mod tests {
             let refusal = |nodes: &[Node], matching: &Matching| {
                 match_topology(&context(1), nodes, matching).unwrap_err().to_string()
             };
-            assert_eq!(refusal(&[node, node], &small), "node [1, 2, 3] is there twice");
+            assert_eq!(refusal(&[node, node], &small), "node [1, 2, 3] is listed twice");
             let lost = Node { phi: f32::NAN, ..node };
             assert_eq!(refusal(&[lost], &small), "the distances of node [1, 2, 3] are not finite");
             assert!(refusal(&[node], &Matching { tolerance: 0.0, ..small }).contains("tolerance"));

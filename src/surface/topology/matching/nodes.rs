@@ -79,7 +79,7 @@ fn is_near(distance: f32) -> bool {
     f64::from(distance) * f64::from(distance) <= 3.0
 }
 
-/// Whether phi has Gamma's sign at a node, and its surface is not near.
+/// Whether phi has Gamma's sign at a node, and the particles' surface is not near it.
 fn has_same_side(node: &Node) -> bool {
     (node.phi < 0.0) == (node.gamma < 0.0) && !is_near(node.phi)
 }
@@ -95,7 +95,7 @@ fn sorted(nodes: &[Node]) -> Result<Vec<(Coord, u32)>> {
     let mut sorted: Vec<(Coord, u32)> = nodes.iter().map(|node| node.position).zip(0..).collect();
     sorted.par_sort_unstable();
     match sorted.windows(2).find(|pair| pair[0].0 == pair[1].0) {
-        Some(pair) => Err(Error::argument(format!("node {:?} is there twice", pair[0].0))),
+        Some(pair) => Err(Error::argument(format!("node {:?} is listed twice", pair[0].0))),
         None => Ok(sorted),
     }
 }
@@ -121,7 +121,7 @@ fn roles(ctx: &Context, nodes: &[Node], sorted: &[(Coord, u32)], reach: i32) -> 
 }
 
 /// The neighbours of some nodes, before and behind them on x, y and z; [`NONE`]: there is none. All are indices in the order of positions;
-/// those of the piece ascend.
+/// `piece` ascends.
 fn beside(sorted: &[(Coord, u32)], piece: &[u32]) -> Vec<[u32; 6]> {
     let mut out = vec![[NONE; 6]; piece.len()];
     for side in 0..6 {

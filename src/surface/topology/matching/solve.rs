@@ -59,7 +59,7 @@ pub struct Solution {
     pub psi: Vec<f64>,
     /// Count of iterations.
     pub iterations: usize,
-    /// Maximum distance of a psi from the mean of the nodes that it depends on (cells).
+    /// Maximum difference between a psi and the mean psi of the nodes that it depends on (cells).
     pub residual: f64,
 }
 
