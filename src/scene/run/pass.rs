@@ -30,7 +30,7 @@ pub type OnFrameDone<'a> = &'a (dyn Fn(&'static str, i32, &Report) + Sync);
 /// Shared by the passes of a run.
 #[derive(Clone, Copy)]
 pub struct Shared<'a> {
-    /// Its thread pool, cancel and memory limit.
+    /// Its thread pool, cancel flag and memory limit.
     pub ctx: &'a Context,
     /// The shot's first frame.
     pub first: i32,

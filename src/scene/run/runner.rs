@@ -47,7 +47,7 @@ impl<'a> Run<'a> {
     /// Opens or creates the folder, finds the frames that are done, loads the states from which the stages start, and writes the resolved
     /// scene into the folder. The run makes the stages named in `only`, or all.
     ///
-    /// With `from`, the frames before it are kept, whatever settings they were made with. From it on, frames of the stages to make are made
+    /// With `from`, the frames before it are kept, whatever settings they were made with. From it on, the frames of these stages are made
     /// again, and those of stages downstream of them are removed.
     ///
     /// # Errors

@@ -44,7 +44,7 @@ pub const GRAIN_KEYS: &[Key] = &[
     key(STEP, "grains", "active_distance", Number(1.0e-5, FAR, "m"), optional("0.15"))
         .means("slow grains farther than this (m) from objects and fast grains rest at once; no effect with rest = false"),
     key(STEP, "grains", "substeps", Whole(1, 1000), optional("20"))
-        .means("sub-steps of a frame; default: from size, time and speed"),
+        .means("sub-steps of a frame; default: computed from size, time and speed"),
     // No existing frame depends on it.
     key(&[], "grains", "max", Whole(1, 60_000_000), or("20000000"))
         .means("maximum number of grains: a frame that would have more is an error"),

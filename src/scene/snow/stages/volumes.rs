@@ -241,7 +241,7 @@ impl Stage for Volumes<'_> {
     }
 
     fn volumes(&self) -> Vec<Volume> {
-        /// The density of a part, from the grid of its name or from the only one.
+        /// The density of a part, from the grid with the part's name or from the only grid.
         const fn density(grid: &'static str, scale: f32) -> [Field; 1] {
             [Field { name: "density", grid, holds: Holds::Density(scale) }]
         }
