@@ -3,7 +3,7 @@
 //!
 //! A *charted* triangle is a new triangle that has a chart on the first mesh: the triangle there that is nearest to where its middle was.
 //! Where separate bodies of liquid meet, the corners of a new triangle come from positions far apart: such triangles are *torn*. They take
-//! the position of one of the two bodies, and are marked.
+//! their values from one of the two bodies, and are marked.
 
 use super::charts::{Chart, Charts, Traced};
 use super::texture::textured;

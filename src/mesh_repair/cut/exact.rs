@@ -106,7 +106,7 @@ pub fn passages(a: Fixed, b: Fixed) -> Option<Vec<Passage>> {
         let is_next = |axis: usize| {
             open[axis]
                 && (0..3).filter(|other| *other != axis && open[*other]).all(|other| {
-                    // It leaves through this plane first if it is still before that of the other axis.
+                    // The segment leaves through this plane first if it is still before the plane of the other axis there.
                     let beyond = is_beyond(a, b, (axis, plane(axis)), (other, plane(other)));
                     beyond != (last[other] > cell[other])
                 })

@@ -13,7 +13,7 @@ use crate::mesh_repair::prepare::Closed;
 
 /// Maximum number of corners of a ring that is triangulated between its corners: larger ones take too long.
 const MAX_CORNERS: usize = 500;
-/// Largest distance of the corners of such a ring from its mean plane, over their largest distance from its middle.
+/// Largest distance of the corners of such a ring from its mean plane, divided by their largest distance from its middle.
 const FLAT: f64 = 0.5;
 /// Maximum edges compared where several leave a vertex.
 const MAX_BRANCHES: usize = 8;

@@ -81,7 +81,8 @@ pub trait Inside: Sync {
     /// Whether a node is inside.
     fn at(&self, node: Coord) -> bool;
 
-    /// Position of the surface along an edge of the grid whose ends differ (0..=1); none: it lies where the mesh crosses the edge.
+    /// Position of the surface along an edge of the grid that has one end inside and one outside (0..=1); none: it lies where the mesh
+    /// crosses the edge.
     fn share(&self, edge: GridEdge) -> Option<f64>;
 }
 

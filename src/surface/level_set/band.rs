@@ -29,7 +29,7 @@ pub struct Distances {
     /// Distances (cells), negative inside.
     values: Vec<Values>,
     slots: HashMap<Coord, u32>,
-    /// Slots of the 27 blocks around each one, itself in the middle; [`Distances::NONE`]: there is none.
+    /// Slots of the 27 blocks around each block, which is in the middle; [`Distances::NONE`]: there is none.
     around: Vec<[u32; 27]>,
 }
 
@@ -141,7 +141,7 @@ impl Distances {
         reach_in(&self.deep, block).map_or(self.reach, |own| own.max(self.reach))
     }
 
-    /// Coordinates of the blocks, ascending: block (i, j, k) begins at node 8 (i, j, k).
+    /// Coordinates of the blocks, ascending: block (i, j, k) begins at node (8 i, 8 j, 8 k).
     pub fn coords(&self) -> &[Coord] {
         &self.coords
     }

@@ -47,7 +47,7 @@ pub fn level_set(ctx: &Context, distances: &Distances) -> Result<FloatGrid> {
     Ok(grid)
 }
 
-/// Whether spheres of a radius (m) can be made on cells of an edge (m): 1.5 to 100 cells are allowed.
+/// Whether spheres of a radius (m) can be made on cells of `cell` (m): 1.5 to 100 cells are allowed.
 pub fn is_sphere_radius(radius: f64, cell: f64) -> bool {
     (MIN_RADIUS * (1.0 - ROUNDING)..=MAX_RADIUS).contains(&(radius / cell))
 }

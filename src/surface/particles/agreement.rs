@@ -17,13 +17,13 @@ const SAMPLES: usize = 2000;
 const TOO_FAR_APART: f64 = 1.0;
 /// Distance (spacings) up to which particles are neighbours.
 const BESIDE: f64 = 1.5;
-/// Velocities are wrong if over this fraction of particles finds no other particle where its velocity takes it.
+/// Velocities are wrong if more than this fraction of the particles miss: they find no other particle where their velocity takes them.
 const MISSED: f64 = 0.5;
-/// If more than the first fraction of the particles misses, factors on the velocities are tried; the best one is reported if it divides
-/// that fraction by more than the second number.
+/// If more than the first fraction of the particles miss, factors on the velocities are tried; the best one is reported if it divides that
+/// fraction by more than the second number.
 const SOME_MISSED: [f64; 2] = [0.05, 4.0];
 /// Factors between units: feet, ten, inches, centimetres and millimetres. Of equally good factors the first is taken: very small velocities
-/// leave all particles within the liquid, where none misses.
+/// leave all particles within the liquid, where none miss.
 const FACTORS: [f64; 10] =
     [0.3048, 1.0 / 0.3048, 0.1, 10.0, 0.0254, 1.0 / 0.0254, 0.01, 100.0, 0.001, 1000.0];
 

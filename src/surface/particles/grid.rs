@@ -42,7 +42,7 @@ struct Item {
 }
 
 impl Cells {
-    /// Sorts particles at positions (m) into cells of an edge (m); `rank` orders those at the same position.
+    /// Sorts particles at positions (m) into cells of `edge` (m); `rank` orders those at the same position.
     ///
     /// # Errors
     /// Particles so far apart that there are more than two million cells between them.
@@ -114,7 +114,7 @@ impl Cells {
         })
     }
 
-    /// Input indices of the particles of each of these cells.
+    /// Input indices of the particles of each cell that holds any.
     pub fn runs(&self) -> impl Iterator<Item = &[u32]> {
         self.start.windows(2).map(|ends| &self.order[ends[0] as usize..ends[1] as usize])
     }

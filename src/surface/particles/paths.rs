@@ -18,9 +18,9 @@ pub struct Paths {
     to: Vec<DVec3>,
     /// Velocities times the time between the frames (m), at both ends; empty: paths are lines.
     tangents: Vec<[DVec3; 2]>,
-    /// Order of particles at the same position.
+    /// Rank of each path, which orders particles at the same position.
     ranks: Vec<i64>,
-    /// How velocities disagree with positions, if they do: they are then ignored.
+    /// How velocities disagree with positions, if they do: velocities are then ignored.
     pub mismatch: Option<VelocityMismatch>,
     /// Count of particles that exist only in the first frame, and of those that exist only in the second.
     pub died: usize,
@@ -126,7 +126,7 @@ impl Paths {
         self.from.len()
     }
 
-    /// Order of particles at the same position.
+    /// Rank of a path, which orders particles at the same position.
     pub fn rank(&self, path: u32) -> i64 {
         self.ranks[path as usize]
     }

@@ -12,7 +12,7 @@ pub struct Improvable<'a> {
     /// For each vertex, the lengths of the shortest and of the longest edge around it at its birth, so that no edge is out of range then.
     /// Edges between vertices of size 0 are never out of range.
     pub sizes: &'a mut Vec<Size>,
-    /// For each vertex, its vertex before the frame; none: it was created in this frame.
+    /// For each vertex, its index before the frame; none: it was created in this frame.
     pub origins: &'a mut Vec<Option<u32>>,
     /// Displacement of each vertex since a reference some frames ago; not finite: unknown.
     pub drifts: &'a mut Vec<[f32; 3]>,

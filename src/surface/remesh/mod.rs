@@ -228,8 +228,8 @@ impl Work<'_, '_, '_> {
         Ok(())
     }
 
-    /// Edges of triangles that are out of range and not at rest, each once, in the order of their lengths times a sign, then of their
-    /// vertices.
+    /// Of the edges of some triangles, those that are out of range and not at rest, each once, in the order of their lengths times `sign`,
+    /// then of their vertices.
     fn edges(&self, near: &[u32], is_out: fn(f64) -> bool, sign: f64) -> Vec<[u32; 2]> {
         let mut edges = Vec::new();
         for &triangle in near.iter().filter(|triangle| self.rings.exists(**triangle)) {

@@ -131,7 +131,7 @@ fn candidates(phi: &Implicit, surface: &Isosurface, parts: &Parts, with_feet: &M
     (0..surface.vertex_count() as u32).into_par_iter().with_min_len(4096).filter_map(position).collect()
 }
 
-/// Items in cubes of an edge (cells).
+/// Items in cubes (bins) with edges of `edge` (cells).
 struct Bins {
     edge: f64,
     /// Ascending, each once.
@@ -156,7 +156,7 @@ impl Bins {
     }
 }
 
-/// Calls `see` with bins of an edge (cells) that together contain a triangle; it is subdivided until each piece spans only a few bins.
+/// Calls `see` with bins of `edge` (cells) that together contain a triangle; it is subdivided until each piece spans only a few bins.
 fn each_bin(triangle: [DVec3; 3], edge: f64, mut see: impl FnMut(Coord)) {
     let [a, b, c] = &triangle;
     if (a.sup(b).sup(c) - a.inf(b).inf(c)).max() > LONG * edge {

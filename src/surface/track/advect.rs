@@ -109,7 +109,7 @@ struct Field<'a> {
     spacing: f64,
 }
 
-/// Sorts vertices (m) by cells of an edge (m). `order` holds their cells and indices in the previous order.
+/// Sorts vertices (m) by cells of `edge` (m). `order` holds their cells and indices in the previous order.
 fn sort(vertices: &[DVec3], edge: f64, order: &mut [(Coord, u32)]) {
     order.par_iter_mut().with_min_len(4096).for_each(|(cell, vertex)| {
         let position = vertices[*vertex as usize];

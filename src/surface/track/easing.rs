@@ -36,7 +36,7 @@ pub struct EasingTargets {
 }
 
 impl EasingTargets {
-    /// The targets of a change of a mesh that had these triangles; particles are a spacing (m) apart.
+    /// The targets of a change of a mesh that had these triangles; particles are `spacing` (m) apart.
     ///
     /// # Errors
     /// Cancel.

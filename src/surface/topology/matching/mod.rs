@@ -1,7 +1,7 @@
 //! Topology matching (thesis 2.4): near flagged nodes, Gamma takes the topology of phi.
 //!
 //! Gamma is the signed distance from the mesh, phi that from the particles' surface, and psi = Gamma - phi (Eq. 2.2). At fixed nodes, near
-//! the mesh and not flagged, psi stays as it is: the mesh's detail. Between them it is as smooth as possible, a solution of Laplace's
+//! the mesh and not flagged, psi stays as it is: the mesh's detail. Between them psi is as smooth as possible, a solution of Laplace's
 //! equation (Eq. 2.3), and Gamma becomes phi + psi: it merges and splits where phi does, and is unchanged where nothing is flagged. Lengths
 //! are in cells.
 //!
