@@ -314,7 +314,7 @@ impl Sequence {
         args.warn_once(&input, &*motion, frame, has_warned)?;
         args.write(path, &*motion, frame, false)?;
         log::info!(
-            "{}: converted without velocities: its faces, or those of the next frame, differ",
+            "{}: converted without velocities: its faces differ from those of the frames before or of the next frame",
             input.display()
         );
         Ok(motion.triangles().len())

@@ -108,11 +108,11 @@ const MAX_NODES_IN_LINE: usize = 6;
 fn clip_gait(path: &Path, clip: &str, seconds: f64) -> frazil::Result<Value> {
     let play = Play { clip: Some(clip.into()), repeat: false, ..Play::default() };
     let Some(gait) = gait(&Character::open(path, play)?, 0.0, seconds)? else {
-        return Ok(json!({ "says": "nothing stands for long" }));
+        return Ok(json!({ "says": "no part stands still for long" }));
     };
     let (carry, speed) = (gait.carry(), gait.velocity.norm());
     let says = if speed * seconds < 0.02 * gait.height {
-        "stands where it is: no keys are needed".to_string()
+        "stays in place: no keys are needed".to_string()
     } else if gait.is_steady() {
         format!(
             "move it by [{:.3}, 0, {:.3}] in each cycle of {seconds:.3} s ({speed:.3} per second), or its feet slip",

@@ -42,7 +42,7 @@ impl Fault {
                  combinations and volumes of it are wrong"
             ),
             Self::Thin(cells) => {
-                format!("has distances up to {cells:.2} cells from its surface only, and tools need 2 to 3")
+                format!("has distances only up to {cells:.2} cells from its surface, and tools need 2 to 3")
             }
         }
     }

@@ -206,7 +206,7 @@ pub fn offset(ctx: &Context, grid: &mut FloatGrid, metres: f32, scheme: Scheme) 
     if scheme == Scheme::FirstOrder && beyond_band(grid, f64::from(metres)) {
         return Err(Error::argument(format!(
             "an offset of {metres} m leaves the band of distances, which is {} m wide: the first-order scheme would \
-             miss it by a tenth of the way, take the fifth-order one (weno5)",
+             fall short by a tenth, use the fifth-order one (weno5)",
             grid.background()
         )));
     }

@@ -84,8 +84,8 @@ fn describe_mist(out: &mut String, mist: &MistForecast, limit: u64) {
         mist.cell_m
     );
     let from = match mist.made_to_frame {
-        Some(frame) if mist.cells == 0 => format!("none is raised, as it was made up to frame {frame}"),
-        Some(frame) => format!("as it was made up to frame {frame}"),
+        Some(frame) if mist.cells == 0 => format!("none was raised up to frame {frame}"),
+        Some(frame) => format!("as made up to frame {frame}"),
         None => {
             out.push_str(
                 "          how far it spreads is known when it is made: make some frames, or a --preview, then check with -o DIR\n",

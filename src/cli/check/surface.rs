@@ -21,7 +21,8 @@ pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure>
     let limit = session.max_memory();
     if let Err(error) = report.check_memory(limit) {
         // This is only a warning, as a run does not know the particles of later frames either.
-        let what = format!("{error}; a run begins all the same, and ends where one part needs more");
+        let what =
+            format!("{error}; a run starts nevertheless, and ends when one part of its work needs more");
         report.warnings.push(what);
     }
     let free = args.free_space();

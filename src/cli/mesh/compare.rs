@@ -267,7 +267,7 @@ impl Comparison {
 
     fn in_a_line(&self) -> String {
         let vertices = self.vertices.as_ref();
-        let vertices = vertices.map_or("other faces".to_string(), |found| {
+        let vertices = vertices.map_or("different faces".to_string(), |found| {
             format!("the same faces, from vertex to vertex {}", in_words(found))
         });
         let (areas, volumes) = (difference(self.areas), difference(self.volumes));

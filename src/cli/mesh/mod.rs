@@ -222,22 +222,25 @@ const JOINED: Nouns<4> = [
 
 const TRIANGLES: Nouns<11> = [
     [
-        "pair of triangles cuts each other: harmless only where both are right side out",
-        "pairs of triangles cut each other: harmless only where both are right side out",
+        "pair of triangles that cut each other: harmless only where both are right side out",
+        "pairs of triangles that cut each other: harmless only where both are right side out",
     ],
     [
-        "pair of triangles with a common corner cuts each other: harmless only where both are right side out",
-        "pairs of triangles with a common corner cut each other: harmless only where both are right side out",
+        "pair of triangles with a common corner that cut each other: harmless only where both are right side out",
+        "pairs of triangles with a common corner that cut each other: harmless only where both are right side out",
     ],
     [
-        "pair of triangles is folded onto each other along its common edge",
-        "pairs of triangles are folded onto each other along their common edges",
+        "pair of triangles folded onto each other along their common edge",
+        "pairs of triangles folded onto each other along their common edges",
     ],
     [
-        "pair of triangles lies on each other in one plane",
-        "pairs of triangles lie on each other in one plane",
+        "pair of triangles that lie on each other in one plane",
+        "pairs of triangles that lie on each other in one plane",
     ],
-    ["pair of triangles touches beyond common corners", "pairs of triangles touch beyond common corners"],
+    [
+        "pair of triangles that touch beyond common corners",
+        "pairs of triangles that touch beyond common corners",
+    ],
     ["triangle without area: ignored", "triangles without area: ignored"],
     ["triangle with the corners of another", "triangles with the corners of another"],
     ["vertex at the position of another: joined", "vertices at the position of another: joined"],

@@ -280,7 +280,7 @@ const PREPARATIONS: [[&str; 2]; 5] = [
         "triangle left out: without area, doubled, or alone",
         "triangles left out: without area, doubled, or alone",
     ],
-    ["triangle turned round as its neighbours are", "triangles turned round as their neighbours are"],
+    ["triangle turned to agree with its neighbours", "triangles turned to agree with their neighbours"],
     ["part turned outward", "parts turned outward"],
     ["hole closed", "holes closed"],
 ];

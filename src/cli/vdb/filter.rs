@@ -92,7 +92,7 @@ pub fn offset(args: &OffsetArgs, session: &Session) -> Result<(), Failure> {
         source.scheme.unwrap_or(if is_beyond_band { SchemeName::Weno5 } else { SchemeName::FirstOrder });
     if is_beyond_band && scheme == SchemeName::FirstOrder {
         return Err(Failure::refused(format!(
-            "--scheme first-order would miss --by {} by a tenth, since that leaves the band of distances ({} m): use \
+            "--scheme first-order would fall short of --by {} by a tenth, since that leaves the band of distances ({} m): use \
              weno5",
             args.by,
             grid.background()

@@ -41,11 +41,11 @@ impl<'a, W: Write> Gif<'a, W> {
     /// Adds a frame by the indices of its colours ([`Palette::indices`]), shown for `delay` hundredths of a second.
     ///
     /// # Errors
-    /// Another number of pixels than the file's; errors of the file.
+    /// A number of pixels that differs from the file's; errors of the file.
     pub fn add(&mut self, indices: Vec<u8>, delay: u16) -> Result<()> {
         let [width, height] = self.size.map(usize::from);
         if indices.len() != width * height {
-            return Err(Error::other("a frame of a GIF has another size than the others"));
+            return Err(Error::other("a frame of a GIF has a different size from the others"));
         }
         let unchanged = self.palette.colours().len() as u8;
         let is_first = self.before.is_empty();

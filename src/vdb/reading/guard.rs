@@ -273,5 +273,5 @@ fn floats(path: &Path, grid: AnyGrid) -> Result<FloatGrid> {
 
 /// The error for a parcel that is complete but has other contents than requested.
 fn unexpected(path: &Path) -> Error {
-    Error::file(path, "the .vdb file is damaged: decoding it came to nothing")
+    Error::file(path, "the .vdb file is damaged: decoding it gave no usable result")
 }

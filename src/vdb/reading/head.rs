@@ -84,7 +84,7 @@ impl Head {
     }
 }
 
-/// The rest of a head.
+/// The part of a head that is still to be read.
 pub(in crate::vdb) struct Cursor<'a>(pub(super) &'a [u8]);
 
 impl<'a> Cursor<'a> {

@@ -164,7 +164,7 @@ fn mist_that_was_not_raised_takes_nothing() {
     assert_eq!(said["mist"]["made_to_frame"], 10, "{said}");
     assert_eq!(said["mist"]["cells"], 0, "{said}");
     let text = works(folder, &format!("check shot.toml -o cache {calm}"));
-    assert!(text.contains("none is raised, as it was made up to frame 10: 0 cells"), "{text}");
+    assert!(text.contains("none was raised up to frame 10: 0 cells"), "{text}");
     assert!(!text.contains("known when it is made"), "{text}");
 }
 
@@ -185,7 +185,7 @@ fn mist_that_was_made_says_how_far_it_spreads() {
     // The same air in cells of half the edge.
     let fine = report(folder, "-o cache --set mist.cell=0.015");
     assert!((number(&fine["mist"], "cells") / (8.0 * most) - 1.0).abs() < 1e-3, "{fine} {most}");
-    assert!(works(folder, "check shot.toml -o cache").contains("as it was made up to frame 8: "));
+    assert!(works(folder, "check shot.toml -o cache").contains("as made up to frame 8: "));
     // Its files take no more than that.
     let file = |frame: i32| folder.join(format!("cache/mist/mist.{frame:04}.vdb"));
     let files: u64 = (1..=8).map(|frame| fs::metadata(file(frame)).unwrap().len()).sum();

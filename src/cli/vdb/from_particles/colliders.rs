@@ -103,7 +103,9 @@ impl Solid {
         }
         if !surface.is_closed() {
             let (path, name) = (path.display(), grid.name());
-            log::warn!("{path}: grid \"{name}\" ends inside of the surface: the holes are closed by cones");
+            log::warn!(
+                "{path}: grid \"{name}\" ends inside the solid, so that its surface has holes: they are closed by cones"
+            );
         }
         Ok(Self::Surface(surface, None))
     }

@@ -320,7 +320,7 @@ impl Args {
         };
         if let Some(n) = (0..out.len()).find(is_taken) {
             let what =
-                format!("the mesh would have two arrays \"{}\": name others with --attributes", out[n].0);
+                format!("the mesh would have two arrays \"{}\": choose others with --attributes", out[n].0);
             return Err(Error::file(path, what));
         }
         Ok(out)
