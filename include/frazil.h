@@ -1062,9 +1062,9 @@ typedef struct frz_pool frz_pool;
  * system call except to read the thread's clock when a step has a budget. Memory grows only when more is needed than ever before, for
  * instance more columns because a body uncovers another layer; failing calls may allocate too.
  *
- * A cancel takes effect at the beginning of such a call, and also during a frame that may take long: one with exact steps, one whose
- * columns times its steps exceed about two million, or one with many full columns. Such a frame first copies what it changes, so that a
- * cancel leaves the liquid as it was. None of these calls has phases, which all other work has: frz_context_progress and
+ * A cancel takes effect at the beginning of such a call, and also during a frame that may take a long time: one with exact steps, one
+ * whose columns times its steps exceed about two million, or one with many full columns. Such a frame first copies what it changes, so
+ * that a cancel leaves the liquid as it was. None of these calls has phases, which all other work has: frz_context_progress and
  * frz_context_timings do not see them. Phases take locks and memory, and a poll between them may take longer than the few milliseconds of
  * a frame.
  */

@@ -52,7 +52,7 @@ const MATCH: usize = 4;
 const MESH: [usize; 2] = [5, 6];
 /// Steps of `spot_drop` on which cells are compared.
 const STEPS: usize = 16;
-/// Steps of `dambreak` of which shares are told: later ones take long.
+/// Steps of `dambreak` of which shares are told: later ones take a long time.
 const DAM_STEPS: usize = 16;
 /// Which of the made sets stands for `spot_drop` where that is missing.
 const PINCH: usize = 1;

@@ -1,8 +1,8 @@
 //! Frames: the choice of their steps, and how they end. A frame that fails or is cancelled leaves the liquid as it was.
 //!
-//! To allow this, a frame that may take long first copies what it changes, 20 bytes a column where there is liquid. It checks for
-//! cancellation between its steps, and between the iterations that find the heads of full columns. Other frames end before a cancel would
-//! matter: they copy nothing.
+//! To allow this, a frame that may take a long time first copies what it changes, 20 bytes a column where there is liquid. It checks for
+//! cancellation between its steps, and between the iterations that find the heads of full columns. Other frames are too short for a cancel
+//! to matter, and copy nothing.
 
 use std::sync::atomic::AtomicBool;
 
@@ -18,7 +18,7 @@ use crate::numeric::checks::ensure;
 use crate::numeric::cpu::FlushDenormals;
 use crate::numeric::digits;
 
-/// Columns times steps above which a frame may take long: some 20 ms.
+/// Columns times steps above which a frame counts as long: some 20 ms.
 const LONG_FRAME: f64 = (1 << 21) as f64;
 /// Fixed cost of a step, in columns.
 const STEP_COST: f64 = 1024.0;
@@ -44,17 +44,17 @@ fn out_of_range(noun: &str, length: f64) -> Error {
 pub(super) fn too_many_steps(dt: f64, done: f64, length: f64) -> Error {
     let [dt, done, length] = [dt, done, length].map(digits::given);
     Error::argument(format!(
-        "a frame of {dt} s takes over {MAX_STEPS} steps: after {done} s they are of {length} s"
+        "a frame of {dt} s takes over {MAX_STEPS} steps: after {done} s, the next step is only {length} s long"
     ))
 }
 
 impl Shallow {
     /// One frame of `dt` (s), 1e-12 to 1e6.
     ///
-    /// Cancellation is checked at the start and, if the frame may take long (exact steps; over some two million columns times steps; many
-    /// full columns), every few milliseconds. The caller's thread does all the work; with many columns, the context's pool does, and
-    /// the pool is entered once. With a pool without threads, nothing is allocated, locked, logged or polled, except that the list of steps
-    /// may grow.
+    /// Cancellation is checked at the start and, if the frame may take a long time (it has exact steps or many full columns, or its columns
+    /// times its steps exceed about two million), every few milliseconds. The caller's thread does all the work or, with many columns, the
+    /// context's pool, which is entered once. With a pool without threads, nothing is allocated, locked, logged or polled, except that the
+    /// list of steps may grow.
     ///
     /// # Errors
     /// `Argument`: dt out of range, or over a million steps needed. `Cancelled`. In either case the liquid is as it was.
@@ -146,7 +146,7 @@ impl Shallow {
 
     fn save_rollback(&mut self) {
         let mut saved = std::mem::take(&mut self.rollback);
-        // The maximum size: it is not reserved again when the liquid spreads.
+        // The maximum size, so that no more memory is needed when the liquid spreads.
         saved.state.clear();
         saved.state.reserve(self.max_save_size());
         self.save_into(&mut saved.state);

@@ -34,7 +34,7 @@ pub struct Shallow {
     pub(super) remap: Remap,
     pub(super) falls: Falling,
     pub(super) thick: ThickenedPipes,
-    /// The state before a frame that may take long, restored if that fails or is cancelled.
+    /// The state before a frame that may take a long time, restored if the frame fails or is cancelled.
     pub(super) rollback: Rollback,
     /// Cells that belong to another liquid.
     pub(super) excluded: Option<ExcludedCells>,

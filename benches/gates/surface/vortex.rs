@@ -23,7 +23,7 @@ const FRAMES: u32 = 72;
 const STEPS: u32 = 4;
 /// Every so many frames a line is printed.
 const SHOWN: u32 = 6;
-/// The same of a mesh that is rebuilt: 12 frames per second, and threads. Rebuilding a torn sheet takes long.
+/// The same of a mesh that is rebuilt: 12 frames per second, and threads. Rebuilding a torn sheet takes a long time.
 const REBUILT_FRAMES: u32 = 36;
 const REBUILT_STEPS: u32 = 8;
 const THREADS: usize = 2;

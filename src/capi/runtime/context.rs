@@ -129,7 +129,7 @@ impl Drop for LightCall<'_> {
     }
 }
 
-/// Begins a real-time call with a context, unless it is cancelled. A later cancel takes effect only in frames that may take long.
+/// Begins a real-time call with a context, unless it is cancelled. A later cancel takes effect only in frames that may take a long time.
 ///
 /// # Safety
 /// As [`enter`].

@@ -128,7 +128,7 @@ static frz_noise a_noise(void) {
 }
 
 static int impatient(void *user, const frz_progress *progress) {
-    /* Some ten milliseconds each: no call takes long. */
+    /* Some ten milliseconds each: no call takes a long time. */
     (void)progress;
     return ++*(int *)user > 40;
 }

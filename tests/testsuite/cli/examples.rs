@@ -253,7 +253,7 @@ fn every_command_has_help_with_an_example_that_runs() {
         let examples: Vec<&str> = help.lines().filter_map(|line| line.strip_prefix("  frazil ")).collect();
         assert!(!examples.is_empty(), "{command} has no example: {help}");
         for example in examples.iter().flat_map(|line| line.split(" && ")) {
-            // Fine cells take long and prove nothing more.
+            // Fine cells take a long time and prove nothing more.
             let line = format!("frazil {}", example.strip_prefix("frazil ").unwrap_or(example));
             works(folder, &line.replace("--cell 0.00", "--cell 0.0"));
         }

@@ -100,7 +100,7 @@ fn mutated(random: &mut Dice, text: &str) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// Runs something that may refuse, but not panic, nor take long.
+/// Runs something that may refuse, but must neither panic nor take a long time.
 #[track_caller]
 fn survives<R>(what: &str, work: impl FnOnce() -> R) -> R {
     let start = Instant::now();
