@@ -94,7 +94,7 @@ impl Bugs {
             ("20 text .stl", self.text_is_read()),
             ("21 mixed winding", self.mixed_winding()),
             ("ids are rows", self.follows("surface-ids_are_rows", PLY, "m.ply").objects("row numbers")),
-            ("velocity unit", self.follows("surface-velocity_unit", PLY, "m.ply").objects("their unit")),
+            ("velocity unit", self.follows("surface-velocity_unit", PLY, "m.ply").objects("another unit")),
             ("inside-out words", self.inside_out_is_named()),
         ]
     }

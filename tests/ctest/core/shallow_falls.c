@@ -252,7 +252,7 @@ static void lifts(frz_context *ctx) {
     WORKS(frz_shallow_set_bodies(ctx, shallow, &ball, 1, NULL));
     FAILS(frz_shallow_surface(ctx, shallow, &layout, &target, &size), WRONG, "since the ground or a body moved");
     WORKS(frz_shallow_snapshot_take(snapshot, shallow));
-    FAILS(frz_shallow_snapshot_surface(ctx, snapshot, &layout, &target, &size), WRONG, "when the snapshot was taken");
+    FAILS(frz_shallow_snapshot_surface(ctx, snapshot, &layout, &target, &size), WRONG, "for the ground of this snapshot");
     box[2] = -1;
     FAILS(frz_shallow_find_lifts(ctx, shallow, NULL, box, &fitted), WRONG, "have no inside");
     CHECK(fitted.upward == 0);
@@ -316,7 +316,7 @@ static void skirts(frz_context *ctx) {
     WORKS(frz_shallow_snapshot_surface(ctx, snapshot, &layout, &target, &size));
     CHECK(size.vertices == plain.vertices + 36);
     WORKS(frz_shallow_snapshot_take(snapshot, shallow));
-    FAILS(frz_shallow_snapshot_surface(ctx, snapshot, &layout, &target, &size), WRONG, "when the snapshot was taken");
+    FAILS(frz_shallow_snapshot_surface(ctx, snapshot, &layout, &target, &size), WRONG, "for the ground of this snapshot");
     more.struct_size = 3;
     FAILS(frz_shallow_find_ledges(ctx, shallow, &more), FRZ_ERROR_VERSION, "struct_size = 3");
     WORKS(frz_shallow_find_ledges(ctx, shallow, NULL));

@@ -196,7 +196,7 @@ fn what_cannot_be_drawn_is_said_before_anything_is_written() {
         ("cube.obj -o p.gif", &["p.gif", "--frames"]),
         ("shot/base/base.0001.vdb --frames 1-4 -o p.gif", &["--frames", "none is given"]),
         ("shot/base/base.0001.vdb --fps 12 -o p.png", &["--fps", "none is given"]),
-        ("bare -o p.gif", &["bare", "no folder of a shot"]),
+        ("bare -o p.gif", &["bare", "not the folder of a shot"]),
         ("shot/base/base.%04d.vdb -o p.png", &["base.0000.vdb", "--frame"]),
         ("shot/base/base.%04d.vdb --frames 5-6 -o p.gif", &["base.0005.vdb", "does not exist"]),
         ("shot --frames 1-4 -o none/p.%04d.png", &["none"]),
