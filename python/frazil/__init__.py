@@ -1,7 +1,7 @@
 """Snow that bodies press into, meshes that follow liquids, and shallow liquids: frazil's C library from Python, with NumPy arrays and no build.
 
-The library is found through FRAZIL_LIBRARY, else beside the module, else in the tree that it was installed with, else
-by the system's loader.
+The library is the one that FRAZIL_LIBRARY names, else the one next to the module, else that of the installed tree, else
+the one that the system's loader finds.
 
     import frazil, numpy
     ctx = frazil.Context(threads=2)
@@ -20,16 +20,16 @@ by the system's loader.
     tracker = frazil.Tracker(ctx, mesh, first, spacing=frazil.spacing(ctx, first))   # first: frazil.Particles
     tracker.step(first, second, dt=1 / 24)
     tracker.positions, tracker.read("flagged")
-    solid, report = mesh.repaired(ctx, cell=0.01)          # closed, as rebuild=True of a Tracker needs it
-    tracker.triangles, tracker.edits                       # which change then where the liquid merges or splits
+    solid, report = mesh.repaired(ctx, cell=0.01)          # closed, as a Tracker with rebuild=True requires
+    tracker.triangles, tracker.edits                       # with rebuild=True these change where the liquid merges or splits
 
     blood = frazil.Shallow(ctx, bone, cell=0.001, liquid="blood")    # a frazil.Mesh, heights (nz, nx), or a level set
     blood.set_flows([frazil.Source((0.0, 0.02, 0.0), rate=1e-6), frazil.Drain((0.01, 0.0, 0.0), rate=2e-6)])   # m3/s
     blood.step(1 / 60, budget=0.004)
     blood.lent("depth") * blood.info.unit, blood.surface().triangles        # NumPy sees the library's own memory
 
-Lengths are metres, times seconds; Y is up. Everything that fails raises frazil.Error with one sentence.
-Handles have close(), and work in with blocks.
+Lengths are metres, times seconds; Y is up. A call that fails raises frazil.Error with one sentence.
+Handles have close(), and can be used in with blocks.
 """
 
 from ._library import ABI_VERSION, Error, library, version

@@ -338,7 +338,7 @@ class ShallowDropsTarget(c.Structure):
     ]
 
 
-# The structs by their names in the header: a test compares every field's place.
+# The structs by their names in the header: a test compares the offset of every field.
 STRUCTS = {
     "frz_view": View, "frz_span": Span, "frz_progress": Progress, "frz_stage_time": StageTime,
     "frz_attribute": Attribute, "frz_mesh_desc": MeshDesc, "frz_mesh_info": MeshInfo, "frz_leaf": LeafView,
@@ -442,7 +442,7 @@ _LENT = ["base_grid", "base_removed", "base_compression", "base_touched"]
 
 
 def saved(function, ctx, pointer):
-    """The bytes that a saving function of the C interface gives."""
+    """The bytes that a saving function of the C interface writes."""
     size = c.c_size_t()
     call(function, ctx.pointer, pointer, None, 0, c.byref(size))
     out = c.create_string_buffer(size.value)
@@ -467,8 +467,8 @@ LIBRARY = "libfrazil.so.1"
 
 
 def _find():
-    """Where the library is: FRAZIL_LIBRARY, beside this module, in the tree that it was installed with, or wherever the
-    system's loader looks."""
+    """The path of the library: that in FRAZIL_LIBRARY, else next to this module, else in the installed tree, else just its
+    name, which the system's loader looks up."""
     named = os.environ.get("FRAZIL_LIBRARY")
     if named:
         return named
@@ -484,7 +484,7 @@ def _load():
         lib = c.CDLL(path)
     except OSError as error:
         raise ImportError(f"frazil's C library was not found ({error}): set FRAZIL_LIBRARY to the path of {LIBRARY}, or "
-                          f"put it beside {pathlib.Path(__file__).parent}") from None
+                          f"put it next to {pathlib.Path(__file__).parent}") from None
     lib.frz_version.restype = c.c_uint32
     lib.frz_last_error.restype = c.c_char_p
     kinds = {name: (arguments, c.c_uint32) for name, arguments in _FUNCTIONS.items()}
@@ -507,11 +507,11 @@ def version():
 
 
 class _Calls(threading.local):
-    """What callbacks raised in this thread's running call: it is raised again when the call has ended, for nothing may
-    be thrown through C."""
+    """The exception that a callback raised in this thread's running call: it is raised again when the call has ended,
+    because exceptions must not pass through C."""
 
     raised = None
-    # The contexts that were cancelled because of it.
+    # The contexts that were cancelled because of the exception.
     stopped = ()
 
 
@@ -519,13 +519,13 @@ _calls = _Calls()
 
 
 def keep(error):
-    """Keeps what a callback raised, the first of a call; the call should be cancelled."""
+    """Keeps the first exception that callbacks raise in a call, which should then be cancelled."""
     if _calls.raised is None:
         _calls.raised = error
 
 
 def stops(context):
-    """Whether something was raised in this call, so that its context has to stop."""
+    """Whether a callback raised an exception in this call, so that its context must be cancelled."""
     if _calls.raised is None:
         return False
     _calls.stopped = (*_calls.stopped, context)
@@ -534,8 +534,8 @@ def stops(context):
 
 @contextlib.contextmanager
 def _interruptible():
-    """Keeps what a handler of Ctrl-C raises within C: Python runs it in whatever callback comes next, and would lose an
-    exception that it raises before the callback's first line."""
+    """Keeps what a handler of Ctrl-C raises during a call into C: Python runs the handler in the next callback, and would
+    lose an exception raised before the callback's first line."""
     before = signal.getsignal(signal.SIGINT) if threading.current_thread() is threading.main_thread() else None
     if not callable(before):
         yield
@@ -544,7 +544,7 @@ def _interruptible():
     def handler(number, frame):
         try:
             before(number, frame)
-        except BaseException as error:  # KeyboardInterrupt is none of Exception
+        except BaseException as error:  # KeyboardInterrupt is not an Exception
             keep(error)
 
     signal.signal(signal.SIGINT, handler)
@@ -555,7 +555,7 @@ def _interruptible():
 
 
 def call(name, *arguments):
-    """Calls frz_<name>; raises what a callback raised in it, or Error where it fails."""
+    """Calls frz_<name>; raises what a callback raised during the call, or Error if the call fails."""
     function = getattr(library, "frz_" + name, None)
     if function is None:
         raise NotImplementedError(f"the library has no frz_{name}: it is the core library, without OpenVDB, or an older one")
@@ -577,7 +577,7 @@ def call(name, *arguments):
 
 
 def _kind_of(name):
-    """What a function makes."""
+    """The kind of object that a function creates."""
     if name.startswith(("grid_to_mesh", "mesh_")):
         return "mesh"
     kind, create, _ = name.rpartition("_create")
@@ -585,12 +585,12 @@ def _kind_of(name):
 
 
 def made(name, *arguments, behind=()):
-    """Calls frz_<name> with an out-pointer at the end, but for the arguments `behind` it; the new handle."""
+    """Calls frz_<name> with an out-pointer, which is the last argument except for those in `behind`. Returns the new handle."""
     out = c.c_void_p()
     try:
         call(name, *arguments, c.byref(out), *behind)
     except BaseException:
-        # A callback raised at the end of a call that went well.
+        # A callback raised an exception at the end of a call that succeeded.
         if out.value:
             getattr(library, f"frz_{_kind_of(name)}_destroy")(out.value)
         raise
@@ -616,18 +616,18 @@ def span(array):
 
 
 def text(value):
-    """A text for C; None stays."""
+    """A text for C; None stays None."""
     return None if value is None else os.fsencode(value)
 
 
 class Handle:
-    """What a C handle is wrapped in: destroyed by close(), at the end of a with block, or when nobody holds it."""
+    """Wraps a C handle, which is destroyed by close(), at the end of a with block, or with its last reference."""
 
     _destroy = None
 
     def __init__(self, pointer, owner=None):
         self._pointer = pointer
-        # What is lent keeps its owner alive, and ends with it.
+        # A lent object keeps its owner alive, and is closed with it.
         self._owner = owner
 
     @property
@@ -639,12 +639,12 @@ class Handle:
 
     @property
     def closed(self):
-        """Whether close() was called, here or on what lends it."""
+        """Whether close() was called, here or on the owner."""
         owner = getattr(self, "_owner", None)
         return not getattr(self, "_pointer", None) or (owner is not None and owner.closed)
 
     def close(self):
-        """Gives the memory back now; closing twice is fine. Not within a call that uses it."""
+        """Frees the memory now; closing twice is harmless. Must not be called within a call that uses the handle."""
         pointer, self._pointer = getattr(self, "_pointer", None), None
         if pointer and getattr(self, "_owner", None) is None and library is not None:
             getattr(library, self._destroy)(pointer)
@@ -666,5 +666,5 @@ class Handle:
         return f"<frazil.{type(self).__name__} {words}>"
 
     def _words(self):
-        """What tells it from others."""
+        """A description for repr()."""
         raise NotImplementedError

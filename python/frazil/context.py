@@ -7,7 +7,7 @@ from ._library import ABI_VERSION, LOG, POLL, Handle, Progress, Span, StageTime,
 
 
 class Pool(Handle):
-    """Worker threads that any number of contexts share. 0: all work is done by the thread that calls."""
+    """Worker threads that any number of contexts share. 0: the calling thread does all the work."""
 
     _destroy = "frz_pool_destroy"
 
@@ -20,25 +20,25 @@ class Pool(Handle):
 
 
 class Context(Handle):
-    """One computation's side channel, on worker threads of its own or on those of a Pool.
+    """A computation: its cancel flag, progress, polls and warnings, on worker threads of its own or on those of a Pool.
 
-    poll(stage, stages_done, seconds) (stage: the verb of the running phase) is called on this thread some ten times a second at least; a true answer
-    cancels. log(text) takes warnings. What either of them raises, and Ctrl-C, ends the running call, which changes
-    nothing, and is raised by it.
+    poll(stage, stages_done, seconds) is called on this thread at least some ten times per second; stage is the name of the
+    running phase. A true return value cancels. log(text) receives warnings. An exception in either of them, or Ctrl-C, ends the
+    running call, which changes nothing and raises this exception.
     """
 
     _destroy = "frz_context_destroy"
 
     def __init__(self, threads=0, poll=None, log=None, memory_limit=0, pool=None):
         if pool is not None and threads:
-            raise ValueError("threads are the pool's: give one of the two")
+            raise ValueError("give either threads or a pool, not both")
         self._shares = pool is not None
         self.pool = pool if self._shares else Pool(threads)
         super().__init__(made("context_create", ABI_VERSION, self.pool.pointer))
         self._asked = False
-        # A reference from here to itself would keep its threads until the garbage collector comes.
+        # If the context referred to itself, its threads would live until the garbage collector ran.
         me = weakref.ref(self)
-        # Kept here as long as C may call them. There is always a poll: Ctrl-C is heard in it.
+        # Kept here as long as C may call them. There is always a poll, because Ctrl-C is detected in it.
         self._poll = POLL(lambda _, progress: me()._ask(poll, progress))
         call("context_set_poll", self.pointer, c.cast(self._poll, c.c_void_p), None)
         if log:
@@ -48,7 +48,7 @@ class Context(Handle):
             call("context_set_memory_limit", self.pointer, memory_limit)
 
     def close(self):
-        """Gives the context back, and its threads if they are its own."""
+        """Destroys the context, and its threads if they are its own."""
         super().close()
         if not getattr(self, "_shares", True):
             self.pool.close()
@@ -58,7 +58,7 @@ class Context(Handle):
             now = progress.contents
             answer = poll is not None and poll(now.stage.decode(), now.stages_done, now.seconds)
             self._asked |= bool(answer)
-        except BaseException as error:  # KeyboardInterrupt is none of Exception
+        except BaseException as error:  # KeyboardInterrupt is not an Exception
             keep(error)
             answer = False
         return int(stops(self) or bool(answer))
@@ -72,7 +72,7 @@ class Context(Handle):
             library.frz_context_cancel(self.pointer)
 
     def go_on(self):
-        """Forgets the cancel of a call that an exception ended, unless somebody asked for one besides."""
+        """Clears the cancel of a call that an exception ended, unless a cancel was also requested."""
         if not self._asked:
             library.frz_context_reset(self.pointer)
 
@@ -82,7 +82,7 @@ class Context(Handle):
         library.frz_context_cancel(self.pointer)
 
     def reset(self):
-        """Forgets a cancel, for the calls that follow."""
+        """Clears a cancel, for the calls that follow."""
         self._asked = False
         library.frz_context_reset(self.pointer)
 
@@ -90,20 +90,20 @@ class Context(Handle):
         return f"on {self.pool.threads} threads"
 
     def progress(self):
-        """What is being done: (verb of the running phase, phases done, seconds); from any thread."""
+        """The progress: (name of the running phase, phases done, seconds since the running call began); from any thread."""
         out = Progress()
         call("context_progress", self.pointer, c.byref(out))
         return out.stage.decode(), out.stages_done, out.seconds
 
     @property
     def fraction(self):
-        """Fraction of the running phase that is done, 0 to 1; None where that is not known. For a poll, or any thread."""
+        """Completed fraction of the running phase, 0 to 1; None if unknown. May be read in a poll, or on any thread."""
         out = Progress()
         call("context_progress", self.pointer, c.byref(out))
         return None if out.fraction < 0 else out.fraction
 
     def timings(self):
-        """The phases of the last call: a list of (verb, seconds)."""
+        """The phases of the last call: a list of (name, seconds)."""
         count = c.c_size_t()
         call("context_timings", self.pointer, Span(None, 0, 0), c.byref(count))
         times = (StageTime * max(count.value, 1))()

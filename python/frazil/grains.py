@@ -7,7 +7,7 @@ import numpy as np
 from ._library import GrainsParams, GrainsReport, Handle, Span, View, call, made, rows, saved, span, view
 from .snow import bodies_of
 
-# Attributes by their usual names: the number in the header, the type, and how many of it a grain has.
+# Attributes by their usual names: the number in the header, the type, and the number of components.
 ATTRIBUTES = {
     "P": (0, np.float32, 3), "P64": (1, np.float64, 3), "v": (2, np.float32, 3), "id": (3, np.int64, 1),
     "pscale": (4, np.float32, 1), "source_frame": (5, np.int32, 1), "rest": (6, np.float32, 3),
@@ -17,17 +17,17 @@ FLOOR, RESTLESS, BOX, AIR_BY_DENSITY = 1, 2, 4, 8
 
 
 class Grains(Handle):
-    """Grains of snow, all of one radius (m): a third of the base layer's voxel gives the usual look.
+    """Grains of snow, all of one radius (m): a third of the base layer's voxel gives the look of the thesis.
 
     floor: the height of a level ground (m); None: there is none.
-    rests: whether grains that lie still come to rest.
+    rests: whether grains that lie still come to rest; the default is True.
     repose_angle_deg: slope of a poured pile, instead of friction.
     stands: height of a wall that just stands (m), instead of attraction.
-    keep_box: (low, high), places (m) of a box outside of which grains are taken away; None: there is none.
-    air_by_density: whether grains among others feel less of the air than those of a thin spray.
+    keep_box: (low, high), the minimum and maximum corner (m) of a box outside of which grains are removed; None: no box.
+    air_by_density: whether the air slows grains with many neighbours less than those of a thin spray.
     Further parameters, as in frz_grains_params: compression, friction, attraction, restitution, air, gravity, lowest, lifetime,
-    max_grains, seed, sub_steps (0: as many as are needed), active_distance (m; 0: slow grains lie still before they rest).
-    state: bytes of save(), to go on from.
+    max_grains, seed, sub_steps, active_distance.
+    state: bytes of save(), from which to resume.
     """
 
     _destroy = "frz_grains_destroy"
@@ -65,15 +65,15 @@ class Grains(Handle):
         return params
 
     def set_params(self, floor=None, **more):
-        """How grains behave from the next step on: all parameters but the radius; those not given are the usual ones."""
+        """Sets how grains behave from the next step on: all parameters but the radius. Those not given take their defaults."""
         params = self._params(self._radius, floor, **more)
         call("grains_set_params", self.pointer, c.byref(params))
 
     def step(self, base, bodies, dt, frame):
-        """Moves the grains through dt seconds, with those born of what the base's last step removed; the report, as
-        frz_grains_report has it.
+        """Moves the grains through dt seconds, and adds those born from the snow that the base's last step removed. Returns a report
+        (frz_grains_report).
 
-        base: a frazil.Base after its step, or the snow as grids before and after it, (before, after), or None.
+        base: a frazil.Base after its step; or (before, after), two grids of the snow before and after the step; or None.
         """
         descs, _kept = bodies_of(bodies)
         report = GrainsReport(c.sizeof(GrainsReport))
@@ -86,7 +86,7 @@ class Grains(Handle):
         return report
 
     def emit(self, positions, velocities=None, frame=0):
-        """Adds loose grains at positions (n, 3) with velocities (n, 3), at rest without; the ids of the new ones, (n,)."""
+        """Adds loose grains at positions (n, 3) with velocities (n, 3), or at rest without velocities. Returns their ids (n,)."""
         places = rows(positions, np.float32, 3)
         fast = None if velocities is None else rows(velocities, np.float32, 3)
         first = c.c_int64()
@@ -100,12 +100,12 @@ class Grains(Handle):
         return count.value
 
     def __bool__(self):
-        """A handle is one, also without any grains."""
+        """True also without any grains."""
         return True
 
     def read(self, name):
-        """A copy of an attribute: P, v, rest (n, 3), id, pscale, source_frame, active, trapped (n,), or P64, places in 64 bits. All have the
-        same order, which changes from step to step: ids tell which grain is which."""
+        """A copy of an attribute: P, v or rest (n, 3); id, pscale, source_frame, active or trapped (n,); or P64 (n, 3), positions in 64 bits. All
+        have the same order, which changes from step to step: ids identify the grains."""
         if name not in ATTRIBUTES:
             raise ValueError(f"grains have no attribute {name!r}, but {', '.join(ATTRIBUTES)}")
         number, kind, width = ATTRIBUTES[name]
@@ -116,9 +116,9 @@ class Grains(Handle):
 
     @property
     def positions(self):
-        """Where they are: (n, 3) in 32 bits."""
+        """Positions of the grains (m): (n, 3) in 32 bits."""
         return self.read("P")
 
     def save(self):
-        """The state, for a cache: bytes that Grains(..., state=...) goes on from."""
+        """The state, for a cache: bytes from which Grains(..., state=...) resumes."""
         return saved("grains_save", self._ctx, self.pointer)

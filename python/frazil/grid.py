@@ -1,4 +1,4 @@
-"""Sparse grids of floats, and of vectors of three: their arrays have one axis more, of length 3."""
+"""Sparse grids of floats, and of vectors, whose arrays have an additional axis of length 3."""
 
 import ctypes as c
 from typing import NamedTuple
@@ -14,7 +14,7 @@ BLOSC, ZIP, NONE = 0, 1, 2
 
 
 class Leaf(NamedTuple):
-    """A block of 8 x 8 x 8 voxels: its least corner, its values [x, y, z], or [x, y, z, component], and which are
+    """A block of 8 x 8 x 8 voxels: its minimum voxel, its values [x, y, z] or [x, y, z, component], and which voxels are
     active."""
 
     origin: tuple
@@ -29,10 +29,11 @@ class Grid(Handle):
 
     @classmethod
     def from_leaves(cls, ctx, leaves, voxel_size, background, grid_class=None, name=None):
-        """Makes a grid of (origin, values[8, 8, 8]) or Leaf tuples; without `active` OpenVDB's rule decides.
+        """Makes a grid of (origin, values[8, 8, 8]) or Leaf tuples. Without `active` all voxels are active, or, in a level set,
+        those nearer to the surface than the background.
 
-        A background of three numbers makes a grid of vectors, of values[8, 8, 8, 3]. Without a grid_class floats are a
-        level set, and vectors UNKNOWN.
+        A background of three numbers makes a grid of vectors, from values[8, 8, 8, 3]. The default of grid_class is LEVEL_SET
+        for floats and UNKNOWN for vectors.
         """
         background = np.asarray(background, np.float32)
         vectors = background.shape == (3,)
@@ -59,7 +60,7 @@ class Grid(Handle):
 
     @classmethod
     def from_bytes(cls, ctx, data, name=None):
-        """Reads a grid out of the bytes of a .vdb file."""
+        """Reads a grid from the bytes of a .vdb file."""
         return cls(made("grid_from_bytes", ctx.pointer, data, len(data), text(name)))
 
     def _words(self):
@@ -69,12 +70,12 @@ class Grid(Handle):
         return f"\"{self.name}\", {kind} of {info.active_voxels} active voxels of {info.voxel_size:g} m"
 
     def copy(self, ctx):
-        """A copy of its own."""
+        """Returns a copy that shares no memory."""
         return Grid(made("grid_copy", ctx.pointer, self.pointer))
 
     @property
     def info(self):
-        """Class, voxel size, counts and box, as frz_grid_info has them."""
+        """Class, voxel size, counts and bounding box: see frz_grid_info."""
         info = GridInfo(c.sizeof(GridInfo))
         call("grid_get_info", self.pointer, c.byref(info))
         return info
@@ -94,11 +95,11 @@ class Grid(Handle):
 
     @property
     def is_vectors(self):
-        """Whether it holds vectors: only what says so takes them."""
+        """Whether it holds vectors, which many functions refuse."""
         return self.info.value_type == VECTOR
 
     def leaves(self):
-        """All leaves, copied."""
+        """Copies of all leaves."""
         vectors, count = self.is_vectors, c.c_size_t()
         name, kind = ("grid_vector_leaves", VectorLeafView) if vectors else ("grid_leaves", LeafView)
         call(name, self.pointer, Span(None, 0, 0), c.byref(count))
@@ -107,7 +108,7 @@ class Grid(Handle):
         return [_leaf(leaf, vectors) for leaf in views[: count.value]]
 
     def probe(self, origins):
-        """What lies at block origins (n, 3): a Leaf each, or the one value of the block, of vectors an array of 3."""
+        """The blocks at origins (n, 3): for each a Leaf, or the single value of its voxels, for vectors an array of 3."""
         origins, vectors = rows(origins, np.int32, 3), self.is_vectors
         name, kind = ("grid_vector_probe", VectorLeafView) if vectors else ("grid_probe", LeafView)
         views = (kind * max(len(origins), 1))()
@@ -116,7 +117,7 @@ class Grid(Handle):
         return [_leaf(leaf, vectors) if leaf.values else one(leaf.tile) for leaf in views[: len(origins)]]
 
     def sample(self, ctx, positions, linear=True):
-        """Values at world positions (n, 3): (n,), of vectors (n, 3)."""
+        """Values at world positions (n, 3): an array (n,), for vectors (n, 3)."""
         positions, vectors = rows(positions, np.float32, 3), self.is_vectors
         out = np.empty((len(positions), 3) if vectors else len(positions), np.float32)
         name = "grid_sample_vectors" if vectors else "grid_sample"
@@ -124,8 +125,8 @@ class Grid(Handle):
         return out
 
     def to_mesh(self, ctx, iso=0.0, adaptivity=0.0, box=None, blocks=None):
-        """Triangles along the surface: all of it, in a box of voxels (least, greatest), or in blocks (n, 3), for instance
-        those of Base.dirty()."""
+        """A triangle mesh of the surface: all of it, or the part in a box of voxels (minimum, maximum), or that in the blocks
+        with origins (n, 3), for instance those of Base.dirty()."""
         start = ctx.pointer, self.pointer, iso, adaptivity
         if blocks is not None:
             origins = rows(blocks, np.int32, 3)
@@ -157,12 +158,12 @@ def _leaf(leaf, vectors):
 
 
 def load(ctx, path, name=None):
-    """Reads a grid from a .vdb file; without a name the first level set, else the first grid of floats, else
+    """Reads a grid from a .vdb file. Without a name it is the first level set, else the first grid of floats, else
     the first of vectors."""
     return Grid(made("grid_load", ctx.pointer, text(path), text(name)))
 
 
 def save(ctx, grids, path, compression=BLOSC, half=False):
-    """Writes grids of different names into one .vdb file."""
+    """Writes grids with different names into one .vdb file."""
     pointers = (c.c_void_p * len(grids))(*[grid.pointer for grid in grids])
     call("grid_save", ctx.pointer, pointers, len(grids), text(path), compression, int(half))

@@ -31,12 +31,12 @@ def sweep(ctx, bodies, dt, voxel_size, half_width=3.0):
 
 
 def csg(ctx, operation, grid, other):
-    """grid becomes the union, difference or intersection of both."""
+    """Replaces grid by the union, difference or intersection of grid and other."""
     call("levelset_csg", ctx.pointer, operation, grid.pointer, other.pointer)
 
 
 def offset(ctx, grid, distance, scheme=FIRST_ORDER):
-    """Moves the surface outward (m)."""
+    """Moves the surface outward by a distance (m)."""
     call("levelset_offset", ctx.pointer, grid.pointer, distance, scheme)
 
 

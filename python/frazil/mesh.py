@@ -10,8 +10,9 @@ from ._library import Attribute, Handle, MeshDesc, MeshInfo, RepairReport, Span,
 class Mesh(Handle):
     """A mesh; positions (n, 3) in metres, faces counter-clockwise seen from outside.
 
-    faces: (m, 3) or (m, 4) vertex numbers; or all corners in one flat array, with the corners of each face in counts.
-    attributes: by name, arrays of (n,) or (n, 1 to 4) floats.
+    faces: (m, 3) or (m, 4) vertex indices; or one flat array of the vertex index of each corner, with the number of corners of
+    each face in counts.
+    attributes: a dict from names to arrays of (n,) or (n, 1 to 4) floats.
     """
 
     _destroy = "frz_mesh_destroy"
@@ -40,7 +41,7 @@ class Mesh(Handle):
 
     @property
     def info(self):
-        """Counts, box, area and volume, as frz_mesh_info has them."""
+        """Counts, bounding box, area and volume: see frz_mesh_info."""
         info = MeshInfo(c.sizeof(MeshInfo))
         call("mesh_get_info", self.pointer, c.byref(info))
         return info
@@ -57,17 +58,17 @@ class Mesh(Handle):
 
     @property
     def counts(self):
-        """Corners of each face."""
+        """Number of corners of each face."""
         return self._read(1, np.uint32, self.info.face_count)
 
     @property
     def indices(self):
-        """Vertices of all corners."""
+        """Vertex index of each corner."""
         return self._read(2, np.uint32, self.info.corner_count)
 
     @property
     def triangles(self):
-        """(t, 3) vertices of the triangles that the faces are cut into."""
+        """(t, 3) vertex indices of the triangles into which the faces are divided."""
         return self._read(3, np.uint32, (self.info.triangle_count, 3))
 
     @property
@@ -85,20 +86,20 @@ class Mesh(Handle):
         return out
 
     def repaired(self, ctx, cell):
-        """A closed mesh of this one, which may be open, cross itself or be inside out in parts, and a report, as frz_repair_report
-        has it. cell: edge (m) of the cells in which it is rebuilt where it is at fault; elsewhere it stays as it is."""
+        """Returns a closed mesh made from this one, which may be open, intersect itself or be inside out in parts, and a report
+        (frz_repair_report). cell: edge (m) of the cells in which faulty regions are rebuilt; all others stay as they are."""
         report = RepairReport(c.sizeof(RepairReport))
         solid = made("mesh_repair", ctx.pointer, self.pointer, cell, behind=[c.byref(report)])
         return Mesh._of(solid), report
 
 
 def faces_of(faces, counts):
-    """Flat corners and counts (empty: triangles) of faces in either form."""
+    """Converts faces in either form to one flat array of corners and the corner counts, which are empty for triangles."""
     faces = np.ascontiguousarray(faces, np.uint32)
     if counts is not None:
         return faces.reshape(-1), np.ascontiguousarray(counts, np.uint32)
     if faces.ndim != 2 or faces.shape[1] < 3:
-        raise ValueError(f"faces of shape (m, 3) or (m, 4) are needed, or counts; not {faces.shape}")
+        raise ValueError(f"faces must have the shape (m, 3) or (m, 4), not {faces.shape}, unless counts are given")
     if faces.shape[1] == 3:
         return faces.reshape(-1), np.empty(0, np.uint32)
     return faces.reshape(-1), np.full(len(faces), faces.shape[1], np.uint32)

@@ -13,14 +13,14 @@ DENSITY, VELOCITY = 0, 1
 
 
 class Mist(Handle):
-    """Powder in the air, on cells of an edge (m): 4/3 of the base layer's voxel gives the usual look.
+    """Powder in the air. cell is the edge of a cell (m): 4/3 of the base layer's voxel gives the look of the thesis.
 
     floor: the height of a level ground (m); None: there is none.
     falling: whether falling grains raise mist too.
     wind: velocity of all the air (m/s), three numbers.
     Further parameters, as in frz_mist_params: from_speed, gravity, half_life, turbulence, turbulence_size, confinement, noise,
-    noise_size, seed, padding. Sizes that are not given are the usual numbers of cells.
-    state: bytes of save(), to go on from.
+    noise_size, seed, padding. By default turbulence_size is 24 cells, and noise_size 4 cells.
+    state: bytes of save(), from which to resume.
     """
 
     _destroy = "frz_mist_destroy"
@@ -52,23 +52,23 @@ class Mist(Handle):
         return params
 
     def set_params(self, floor=None, **more):
-        """How mist behaves from the next step on: all parameters but the cell and the wind; those not given are the usual ones."""
+        """Sets how mist behaves from the next step on: all parameters but the cell and the wind. Those not given take their defaults."""
         params = self._params(self._cell, floor, wind=self._wind, **more)
         call("mist_set_params", self.pointer, c.byref(params))
 
     def step(self, grains, base, bodies, time, dt, wind=None):
-        """Moves the mist through dt seconds from a time (s), with what fast grains raise; the report, as frz_mist_report has it.
+        """Moves the mist through dt seconds from a time (s), and adds what fast grains raise. Returns a report (frz_mist_report).
 
-        grains: frazil.Grains after their step; or (positions (n, 3), velocities (n, 3), radius) of points; or, of points that were at
-            known positions before the step, (positions then, velocities then, positions, velocities, radius); or None.
-        base: a frazil.Base after its step; with points a frazil.Grid, the snow as it was before its step; or None.
+        grains: frazil.Grains after their step; or (positions (n, 3), velocities (n, 3), radius) of points after the step; or, if it is
+            known where the points were before the step, (positions before, velocities before, positions, velocities, radius); or None.
+        base: a frazil.Base after its step; for points a frazil.Grid, the snow as it was before the base layer's step; or None.
         wind: a grid of vectors, or None.
         """
         descs, _kept = bodies_of(bodies)
         report = MistReport(c.sizeof(MistReport))
         snow, gusts = (handle.pointer if handle else None for handle in (base, wind))
         if isinstance(grains, tuple):
-            # Positions and velocities take turns.
+            # Positions and velocities alternate.
             arrays = [rows(array, (np.float64, np.float32)[at % 2], 3) for at, array in enumerate(grains[:-1])]
             name = "mist_step_points" if len(arrays) == 2 else "mist_step_paths"
             raising = (*map(view, arrays), grains[-1])
@@ -86,5 +86,5 @@ class Mist(Handle):
         return Grid(made("mist_grid", ctx.pointer, self.pointer, VELOCITY))
 
     def save(self):
-        """The state, for a cache: bytes that Mist(..., state=...) goes on from."""
+        """The state, for a cache: bytes from which Mist(..., state=...) resumes."""
         return saved("mist_save", self._ctx, self.pointer)

@@ -1,4 +1,4 @@
-"""Small amounts of liquid on a ground, in real time."""
+"""Small amounts of liquid on any ground, in real time."""
 
 import ctypes as c
 import weakref
@@ -18,27 +18,28 @@ PACES = {"realtime": 0, "exact": 1}
 BORDERS = {"closed": 0, "open": 1, "absorbing": 2}
 SECTIONS = {"wetted": 0, "whole": 1}
 FRICTIONS = {"ground": 0, "walls": 1}
-# Arrays of columns: the number in the header, the type, and how many of it a column has.
+# Arrays of columns: the number in the header, the type, and the number of components.
 ARRAYS = {
     "depth": (0, np.float32, 1), "base": (1, np.float32, 1), "ceiling": (2, np.float32, 1), "cell": (3, np.int32, 2),
     "layer": (4, np.uint32, 1), "flux_east": (5, np.float32, 1), "flux_south": (6, np.float32, 1),
     "velocity": (7, np.float32, 2),
 }
-# Arrays that are lent.
+# Arrays that are lent: the number in the header, and the type.
 LENT = {
     "depth": (0, c.c_int32), "base": (1, c.c_int32), "ceiling": (2, c.c_int32), "flux_east": (3, c.c_float),
     "flux_south": (4, c.c_float),
 }
 ALL_LAYERS = NO_COLUMN = 0xffffffff
-# What Shallow.probe answers for each point.
+# What Shallow.probe returns for each point.
 SAMPLE = np.dtype([("height", "f8"), ("depth", "f8"), ("velocity", "f4", 2), ("surface_velocity", "f4", 2), ("column", "u4"),
                    ("layer", "u4")])
 LAWS = {"dye": 0, "decays": 1, "ages": 2}
 
 
 class Source(NamedTuple):
-    """Liquid comes in: rate (m3/s; 1 ml/s is 1e-6) around a place (m), which swings by pulse_share of itself pulse_frequency times a
-    second. In the place of at: on = (triangle, shares), a triangle of the mesh and the shares of its corners, with which it moves."""
+    """Liquid enters at a rate (m3/s; 1 ml/s is 1e-6) around a position at (m). The rate varies by pulse_share of itself, pulse_frequency
+    times per second. Instead of at, on = (triangle, shares) may be given: the index of a triangle of the mesh and barycentric
+    coordinates; the source then moves with the triangle."""
 
     at: Optional[Sequence[float]]
     rate: float
@@ -49,7 +50,7 @@ class Source(NamedTuple):
 
 
 class Drain(NamedTuple):
-    """Liquid goes out, as long as there is some: suction. As Source."""
+    """Liquid leaves, as long as there is some: suction. The fields are those of Source."""
 
     at: Optional[Sequence[float]]
     rate: float
@@ -60,7 +61,7 @@ class Drain(NamedTuple):
 
 
 class Absorber(NamedTuple):
-    """Gauze: a Drain, until it has taken its capacity (m3)."""
+    """Gauze: a Drain that stops once it has taken its capacity (m3)."""
 
     at: Optional[Sequence[float]]
     rate: float
@@ -70,8 +71,8 @@ class Absorber(NamedTuple):
 
 
 class Orifice(NamedTuple):
-    """A hole in the ground, through which liquid runs out by its own weight: opening (m2: its area times the share that the jet fills) times
-    (2 g H)^(1/2) a second, of the mean depth H in its circle, at most rate (m3/s)."""
+    """A hole in the ground, through which liquid runs out by its own weight: opening (m2: its area times the share of it that the jet
+    fills) times (2 g H)^(1/2) per second, H being the mean depth in its circle, but at most rate (m3/s)."""
 
     at: Optional[Sequence[float]]
     opening: float
@@ -81,8 +82,8 @@ class Orifice(NamedTuple):
 
 
 class Scalar(NamedTuple):
-    """What the liquid carries: a "dye", what "decays" by half in each half_life (s), or "ages", the time (s) since it came in. Concentrations
-    lie within -range to range."""
+    """What the liquid carries. law: "dye" does not change, "decays" is halved in each half_life (s), "ages" is the time (s) since the
+    liquid came in. Concentrations lie within -range to range."""
 
     name: str
     law: str = "dye"
@@ -91,14 +92,14 @@ class Scalar(NamedTuple):
 
 
 class Ball(NamedTuple):
-    """A solid that moves (m)."""
+    """A sphere that moves: centre and radius (m)."""
 
     at: Sequence[float]
     radius: float
 
 
 class Capsule(NamedTuple):
-    """A ball on its way from one place to another (m)."""
+    """All points within a radius of the line segment from at to end (m)."""
 
     at: Sequence[float]
     end: Sequence[float]
@@ -106,7 +107,7 @@ class Capsule(NamedTuple):
 
 
 class Box(NamedTuple):
-    """A box with its middle at a place (m), half of its lengths, and the unit vectors along them."""
+    """A box: its centre, half of its length along each of its axes (m), and unit vectors along these axes."""
 
     at: Sequence[float]
     half: Sequence[float]
@@ -148,14 +149,14 @@ def _probe(name, pointer, points):
 
 
 def scalars_of(scalars):
-    """Scalars, as the C interface has them."""
+    """The C interface's structs."""
     return (ShallowScalar * max(len(scalars), 1))(*(
         ShallowScalar(c.sizeof(ShallowScalar), _number("law", scalar.law, LAWS), scalar.name.encode(), scalar.range, scalar.half_life)
         for scalar in scalars))
 
 
 def domain_of(ground, cell, origin, cells, low, high):
-    """Heights, if the ground is such, and the domain."""
+    """The heights, or None if the ground is not a height field, and the domain."""
     heights = None if isinstance(ground, (Mesh, Grid)) else np.ascontiguousarray(ground, np.float32)
     if heights is not None:
         if heights.ndim != 2:
@@ -179,19 +180,19 @@ def domain_of(ground, cell, origin, cells, low, high):
 
 
 class Shallow(Handle):
-    """A small amount of liquid on a ground.
+    """A small amount of liquid on any ground.
 
-    ground: a frazil.Mesh; heights (nz, nx) of the middles of cells (m), rows along x; or a frazil.Grid of distances, which must have all
-    of origin, cells, low and high.
+    ground: a frazil.Mesh; heights (nz, nx) at the centres of cells (m), in rows along x; or a frazil.Grid of distances, which requires
+    all of origin, cells, low and high.
     cell: edge of a cell (m).
-    origin: the corner with the least x and z (m); of a mesh that of its box, else (0, 0).
-    cells: how many along x and z; those that cover the mesh.
-    low, high: range of heights (m); that of the ground, and above it as much again, at least 16 cells.
+    origin: the corner with the minimum x and z (m); by default that of the mesh's bounding box, for heights (0, 0).
+    cells: number of cells along x and z; by default as many as cover the mesh, and for heights as many as there are.
+    low, high: range of heights (m); by default that of the ground, extended upward by as much again, at least by 16 cells.
     liquid: "water", "blood", "paint", "honey" or "thinning blood".
     pace: "realtime" or "exact". border: "closed", "open" or "absorbing". section: "wetted" or "whole". friction: "ground" or "walls".
     Further parameters, as in frz_shallow_params: viscosity, thinnest, thinning_time, thinning_power, gravity, kept, longest_step; falls_most over 0
-    (8192, say) lets liquid fall freely, and falls_height, falls_interval and falls_drop say how; rest (m/s); thickening_scalar, the number of a
-    scalar that viscosity depends on, with thickening_from, thickening_to and thickening_times: None, as is usual, is no scalar.
+    (for instance 8192) lets liquid fall freely, as falls_height, falls_interval and falls_drop state; rest (m/s); thickening_scalar, the index
+    of the scalar that viscosity depends on (by default None), with thickening_from, thickening_to and thickening_times.
     """
 
     _destroy = "frz_shallow_destroy"
@@ -228,32 +229,32 @@ class Shallow(Handle):
         return f"on {self.info.column_count} columns of {self.cells[0]} x {self.cells[1]} cells"
 
     def _keep(self):
-        """Refuses what would take memory away below an array that NumPy still sees."""
+        """Fails if NumPy still uses memory that the caller is about to change or free."""
         self._lent = [lent for lent in self._lent if lent() is not None]
         if self._lent:
-            raise ValueError("arrays that lent() gave are still in use: copy what you keep, and delete them first")
+            raise ValueError("arrays from lent() are still in use: copy what you keep, and delete them first")
 
     def close(self):
-        """Gives the memory back now; closing twice is fine. Not while an array that lent() gave is in use."""
+        """Frees the memory now; closing twice is harmless. Fails while an array from lent() is in use."""
         if getattr(self, "_lent", None):
             self._keep()
         super().close()
 
     def set_params(self, **more):
-        """What flows, and how, from the next frame on; what is not given stays as it was last given. The border, falls and friction stay."""
+        """Sets the parameters from the next frame on. Those not given keep their values; border, friction and the falls_ parameters cannot change."""
         more = self._more | more
         params = self._params(**more)
         call("shallow_set_params", self.pointer, c.byref(params))
         self._more = more
 
     def step(self, dt, budget=0.0):
-        """A frame of dt seconds, within a budget of CPU time (s; 0: none); the report, as frz_shallow_report has it."""
+        """Computes a frame of dt seconds, within a budget of CPU time (s; 0: no limit). Returns a report (frz_shallow_report)."""
         report = ShallowReport(c.sizeof(ShallowReport))
         call("shallow_step", self._ctx.pointer, self.pointer, dt, budget, c.byref(report))
         return report
 
     def replay(self, steps):
-        """A frame of given steps (s), as last_steps has listed them; the report."""
+        """Computes a frame with given steps (s), as last_steps lists them. Returns a report."""
         report, steps = ShallowReport(c.sizeof(ShallowReport)), np.ascontiguousarray(steps, np.float64)
         call("shallow_replay", self._ctx.pointer, self.pointer, view(steps), c.byref(report))
         return report
@@ -269,37 +270,37 @@ class Shallow(Handle):
         return out
 
     def set_flows(self, flows):
-        """Sets Sources, Drains, Orifices and Absorbers, replacing those before."""
+        """Sets Sources, Drains, Orifices and Absorbers, replacing the previous ones."""
         array = (ShallowFlow * max(len(flows), 1))(*(_flow(flow) for flow in flows))
         call("shallow_set_flows", self.pointer, array, len(flows))
 
     def moved(self, flow):
-        """How much a flow point has moved since it was set (m3)."""
+        """The volume (m3) that entered or left through a flow point since it was set."""
         out = c.c_double()
         call("shallow_flow_moved", self.pointer, flow, c.byref(out))
         return out.value
 
     def pour(self, at, volume, radius=0.0):
-        """Pours a volume (m3; negative: takes it) around a place (m); what came in."""
+        """Pours in a volume (m3; negative: takes it out) around a position (m). Returns the volume that was poured in."""
         out = c.c_double()
         call("shallow_pour", self.pointer, (c.c_double * 3)(*at), radius, volume, c.byref(out))
         return out.value
 
     def set_scalars(self, scalars):
-        """Sets Scalars, up to four, that the liquid carries, replacing those before: there is nothing yet of any."""
+        """Sets up to four Scalars that the liquid carries, replacing the previous ones. They are 0 everywhere at first."""
         call("shallow_set_scalars", self.pointer, scalars_of(scalars), len(scalars))
         self._scalars = len(scalars)
 
     def set_poured(self, concentrations):
-        """Sets the concentration of each scalar in what pour(), fill() and set_depths() add from now on."""
+        """Sets the concentration of each scalar in liquid that pour(), fill() and set_depths() add from now on."""
         call("shallow_set_poured", self.pointer, view(np.ascontiguousarray(concentrations, np.float64)))
 
     def set_sourced(self, flow, concentrations):
-        """Sets the concentration of each scalar in what comes through a Source; set_flows() sets them to 0."""
+        """Sets the concentration of each scalar in liquid from a Source; set_flows() sets them to 0."""
         call("shallow_set_sourced", self.pointer, flow, view(np.ascontiguousarray(concentrations, np.float64)))
 
     def concentrations(self, scalar, columns=None):
-        """Concentrations of a scalar of all column indices, or of some; 0 where it is dry."""
+        """Concentrations of a scalar at all column indices, or at given ones; 0 where it is dry."""
         columns = None if columns is None else np.ascontiguousarray(columns, np.uint32).reshape(-1)
         out = np.empty(self.info.index_count if columns is None else len(columns), np.float32)
         if len(out):
@@ -307,7 +308,7 @@ class Shallow(Handle):
         return out
 
     def scalar_balance(self, scalar):
-        """Where all of a scalar is (its own measure x m3), as frz_shallow_scalar_balance has it."""
+        """Where all of a scalar is (its own unit x m3): see frz_shallow_scalar_balance."""
         out = ShallowScalarBalance(c.sizeof(ShallowScalarBalance))
         call("shallow_get_scalar_balance", self.pointer, scalar, c.byref(out))
         return out
@@ -319,26 +320,26 @@ class Shallow(Handle):
         return drops_of("shallow_drops", self.pointer)
 
     def drops_mesh(self, z_up=False, left_handed=False, scale=1.0):
-        """Drops: a mesh of balls and strands."""
+        """A mesh of the drops (Drops): spheres, and strands between them."""
         return drops_mesh_of("shallow_drops_mesh", self._ctx, self.pointer, z_up, left_handed, scale)
 
     def find_lifts(self, bounds=None, least=0.05, margin=0.01, rim=0.1):
-        """Finds minimum heights over the mesh, for surface(lifted=True), anew after the ground or bodies have moved: within bounds (x0, z0, x1, z1),
-        or everywhere. What became of its vertices, as frz_shallow_fitted has it."""
+        """Finds minimum heights over the mesh, for surface(lifted=True): within bounds (x0, z0, x1, z1), or everywhere. Call it again after the ground
+        or bodies have moved. Returns counts of the mesh's vertices (frz_shallow_fitted)."""
         distance, fitted = ShallowDistance(c.sizeof(ShallowDistance), 0, least, margin, rim), ShallowFitted(c.sizeof(ShallowFitted))
         corners = None if bounds is None else (c.c_double * 4)(*bounds)
         call("shallow_find_lifts", self._ctx.pointer, self.pointer, c.byref(distance), corners, c.byref(fitted))
         return fitted
 
     def find_ledges(self):
-        """Finds where the ground ends over nothing, for surface(skirted=True), anew after the ground or bodies have moved. The most vertices and
-        triangles that this adds to a surface."""
+        """Finds where the ground ends, for surface(skirted=True). Call it again after the ground or bodies have moved. Returns the maximum numbers
+        of vertices and triangles that this adds to a surface."""
         size = ShallowSize(c.sizeof(ShallowSize))
         call("shallow_find_ledges", self._ctx.pointer, self.pointer, c.byref(size))
         return size.vertices, size.indices // 3
 
     def fill(self, height):
-        """Fills all columns up to a height (m), or their ceiling."""
+        """Fills all columns up to a height (m), or to their ceiling."""
         call("shallow_fill", self.pointer, height)
 
     def set_depths(self, depths):
@@ -347,25 +348,25 @@ class Shallow(Handle):
 
     @property
     def balance(self):
-        """Where all liquid is (m3), as frz_shallow_balance has it."""
+        """Where all liquid is (m3): see frz_shallow_balance."""
         out = ShallowBalance(c.sizeof(ShallowBalance))
         call("shallow_get_balance", self.pointer, c.byref(out))
         return out
 
     @property
     def info(self):
-        """Counts and measures, as frz_shallow_info has them."""
+        """Counts and dimensions: see frz_shallow_info."""
         out = ShallowInfo(c.sizeof(ShallowInfo))
         call("shallow_get_info", self.pointer, c.byref(out))
         return out
 
     def update_terrain(self, positions, bounds=None):
-        """Moves the vertices (n, 3) of the mesh; bounds: (x0, z0, x1, z1) of all that moves, where it was and where it is. What that did, as
-        frz_shallow_moved has it."""
+        """Moves the vertices (n, 3) of the mesh. bounds: (x0, z0, x1, z1) of all triangles that move, at their old and new positions; None:
+        everywhere. Returns a report (frz_shallow_moved)."""
         return self._move("update_terrain", rows(positions, np.float32, 3), bounds)
 
     def update_heights(self, heights, bounds=None):
-        """Changes the heights (nz, nx) of the height field; as update_terrain."""
+        """Changes the heights (nz, nx) of the height field; bounds and report as in update_terrain."""
         return self._move("update_heights", np.ascontiguousarray(heights, np.float32).reshape(-1), bounds)
 
     def _move(self, name, array, bounds):
@@ -376,7 +377,7 @@ class Shallow(Handle):
         return moved
 
     def set_bodies(self, bodies):
-        """Sets Balls, Capsules and Boxes that move over the ground, replacing those before; as update_terrain."""
+        """Sets Balls, Capsules and Boxes that move over the ground, replacing the previous ones; the report is that of update_terrain."""
         self._keep()
         array = (ShallowBody * max(len(bodies), 1))(*(_body(body) for body in bodies))
         moved = ShallowMoved(c.sizeof(ShallowMoved))
@@ -385,8 +386,8 @@ class Shallow(Handle):
         return moved
 
     def loads(self, density=1060.0, velocities=None):
-        """What the liquid of a density (kg/m3) does to each body now, as frz_shallow_load has it: pressure and drag (N), torque (N m), displaced (m3),
-        wetted (m2). velocities (n, 3) are the bodies' (m/s); without them none moves."""
+        """The current load of the liquid, with a density (kg/m3), on each body (frz_shallow_load): pressure and drag (N), torque (N m),
+        displaced (m3), wetted (m2). velocities: (n, 3) of the bodies (m/s); None: no body moves."""
         velocities = None if velocities is None else rows(velocities, np.float64, 3)
         loads = (ShallowLoad * max(self._bodies, 1))(*(ShallowLoad(c.sizeof(ShallowLoad)) for _ in range(self._bodies)))
         given = View(None, 0, 0) if velocities is None else view(velocities)
@@ -394,8 +395,8 @@ class Shallow(Handle):
         return list(loads)[: self._bodies]
 
     def read(self, name, columns=None):
-        """A copy of an array of all column indices, or of some: depth, base and ceiling (m), cell (n, 2) along x and z, -1 where an index
-        has no column, layer, flux_east and flux_south (m3/s), velocity (n, 2), the mean over the depth (m/s)."""
+        """A copy of an array over all column indices, or given ones: depth, base or ceiling (m); cell (n, 2) along x and z, -1 where an index
+        has no column; layer; flux_east or flux_south (m3/s); or velocity (n, 2), the mean over the depth (m/s)."""
         if name not in ARRAYS:
             raise ValueError(f"shallow liquids have no array {name!r}, but {', '.join(ARRAYS)}")
         number, kind, width = ARRAYS[name]
@@ -406,16 +407,16 @@ class Shallow(Handle):
         return out if width > 1 else out[:, 0]
 
     def lent(self, name):
-        """An array of all column indices in the library's own memory, not to be written: depth, base and ceiling (int32; times info.unit,
-        heights above info.low), flux_east and flux_south (float32; depth in units that a step of info.last_step moves). It changes with
-        whatever changes the liquid. While it is in use the ground and bodies cannot move, and the liquid cannot be closed."""
+        """An array over all column indices in the library's own memory, read-only: depth, base or ceiling (int32; multiply by info.unit, and add
+        info.low to a base or ceiling), flux_east or flux_south (float32; units of depth in a step of info.last_step). Its contents change
+        with the liquid. While it is in use the ground and bodies cannot move, and the liquid cannot be closed."""
         if name not in LENT:
             raise ValueError(f"shallow liquids lend no array {name!r}, but {', '.join(LENT)}")
         number, kind = LENT[name]
         out = View()
         call("shallow_lend", self.pointer, number, c.byref(out))
         memory = (kind * out.count).from_address(out.data)
-        # The array keeps this alive, and is known here as long as NumPy has it.
+        # The array keeps the liquid alive, and is listed as long as NumPy uses it.
         memory.owner = self
         self._lent = [lent for lent in self._lent if lent() is not None] + [weakref.ref(memory)]
         array = np.ctypeslib.as_array(memory)
@@ -423,7 +424,7 @@ class Shallow(Handle):
         return array
 
     def layer(self, name, layer=0):
-        """An array of read() on the cells: (nz, nx) of one layer; NaN where it has no column."""
+        """An array of read() by cell: (nz, nx) for one layer; NaN where the layer has no column."""
         cell, values = self.read("cell"), self.read(name)
         own = (cell[:, 0] >= 0) & (self.read("layer") == layer)
         out = np.full((self.cells[1], self.cells[0], *values.shape[1:]), np.nan, np.float32)
@@ -431,12 +432,12 @@ class Shallow(Handle):
         return out
 
     def probe(self, points):
-        """The liquid at points (n, 3): an array with fields height and depth (m), velocity, the mean, and surface_velocity (m/s), column
-        (NO_COLUMN of frazil.shallow where there is none) and layer."""
+        """The liquid at points (n, 3): an array with the fields height and depth (m), velocity (the mean over the depth) and surface_velocity (m/s),
+        column (frazil.shallow.NO_COLUMN where there is none) and layer."""
         return _probe("shallow_probe", self.pointer, points)
 
     def volume(self, low=None, high=None, layer=None):
-        """Liquid (m3) in a box, on a layer, or in all."""
+        """Volume of liquid (m3) in a box (low, high), on a layer, or everywhere."""
         corners = [None if corner is None else (c.c_double * 3)(*corner) for corner in (low, high)]
         out = c.c_double()
         call("shallow_volume", self.pointer, *corners, ALL_LAYERS if layer is None else layer, c.byref(out))
@@ -444,8 +445,8 @@ class Shallow(Handle):
 
     def surface(self, parts=(), z_up=False, left_handed=False, scale=1.0, least_depth=0.0, opaque_depth=0.01, lifted=False, fade_depth=0.0,
                 skirted=False):
-        """The liquid's Surface, with its scalars and these parts of it: normals, depths, opacities, velocities, layers, columns; lifted: at its minimum
-        heights, which find_lifts() has found; skirted: it comes down where the ground ends, as find_ledges() has found."""
+        """The liquid's Surface, with its scalars and the requested parts: normals, depths, opacities, velocities, layers, columns. lifted: films are at
+        the minimum heights that find_lifts() found; skirted: the surface comes down to the ground's edges that find_ledges() found."""
         return surface_of("shallow_surface", self._ctx, self.pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth, lifted,
                         fade_depth, skirted, self._scalars)
 
@@ -454,7 +455,7 @@ class Shallow(Handle):
         return saved("shallow_save", self._ctx, self.pointer)
 
     def restore(self, state):
-        """Puts a saved state in place: from there it flows as the saved one did."""
+        """Restores a saved state; the liquid then continues as the saved one did."""
         call("shallow_restore", self._ctx.pointer, self.pointer, state, len(state))
 
 
@@ -471,13 +472,13 @@ class Snapshot(Handle):
         return "of a shallow liquid"
 
     def take(self, shallow):
-        """Takes a liquid as it is now."""
+        """Replaces the contents by a liquid's current state."""
         call("shallow_snapshot_take", self.pointer, shallow.pointer)
         self._scalars = shallow._scalars
 
     def surface(self, ctx, parts=(), z_up=False, left_handed=False, scale=1.0, least_depth=0.0, opaque_depth=0.01, lifted=False, fade_depth=0.0,
                 skirted=False):
-        """As Shallow.surface; ctx: another context than that of the thread that computes."""
+        """As Shallow.surface. ctx must not be the context of the thread that computes."""
         return surface_of("shallow_snapshot_surface", ctx, self.pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth, lifted,
                         fade_depth, skirted, self._scalars)
 
@@ -487,7 +488,7 @@ class Snapshot(Handle):
         return drops_of("shallow_snapshot_drops", self.pointer)
 
     def drops_mesh(self, ctx, z_up=False, left_handed=False, scale=1.0):
-        """As Shallow.drops_mesh; ctx: another context than that of the thread that computes."""
+        """As Shallow.drops_mesh. ctx must not be the context of the thread that computes."""
         return drops_mesh_of("shallow_snapshot_drops_mesh", ctx, self.pointer, z_up, left_handed, scale)
 
     def probe(self, points):

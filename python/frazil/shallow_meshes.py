@@ -11,7 +11,7 @@ from ._library import ShallowDropsTarget, ShallowLayout, ShallowSize, ShallowTar
 DROP = np.dtype([("position", "f8", 3), ("velocity", "f8", 3), ("volume", "f8"), ("radius", "f8"), ("age", "f8"), ("source", "u8"),
                  ("number", "u8"), ("concentrations", "f4", 4)])
 LIFTED, SKIRTED = 4, 8
-# Parts of a surface that are written on demand: the type, and how many of it a vertex has.
+# Parts of a surface that are written on request: the type, and the number of components.
 PARTS = {
     "normals": (np.float32, 3), "depths": (np.float32, 1), "opacities": (np.float32, 1), "velocities": (np.float32, 3),
     "layers": (np.uint32, 1), "columns": (np.uint32, 1),
@@ -19,7 +19,8 @@ PARTS = {
 
 
 class Surface(NamedTuple):
-    """The surface of a liquid: positions (n, 3), triangles (t, 3) that face up; the others where they were asked for."""
+    """The surface of a liquid: positions (n, 3), triangles (t, 3) that face up; the other fields if they were
+    requested, else None."""
 
     positions: np.ndarray
     triangles: np.ndarray
@@ -29,12 +30,13 @@ class Surface(NamedTuple):
     velocities: Optional[np.ndarray] = None
     layers: Optional[np.ndarray] = None
     columns: Optional[np.ndarray] = None
-    # (n,) of each scalar.
+    # An array (n,) for each scalar.
     scalars: Optional[list] = None
 
 
 class Drops(NamedTuple):
-    """A mesh of the liquid in the air: positions and velocities (n, 3), the index (n,) of each vertex's drop, triangles (t, 3) that face outward."""
+    """A mesh of the liquid in the air: positions and velocities (n, 3), the index (n,) of each vertex's drop, and triangles (t, 3) that face
+    outward."""
 
     positions: np.ndarray
     velocities: np.ndarray

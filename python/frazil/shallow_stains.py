@@ -1,4 +1,4 @@
-"""What shallow liquids leave on the ground."""
+"""Stains that shallow liquids leave on the ground."""
 
 import ctypes as c
 
@@ -10,9 +10,10 @@ from ._library import Handle, ShallowStaining, call, made, rows, saved, span, vi
 class Stains(Handle):
     """Stains on the vertices of a mesh under a frazil.Shallow, and what its ground has absorbed.
 
-    positions: (n, 3), where the vertices are (m); triangles: (m, 3), their numbers, which stay.
-    scalar: number of the scalar that stains; None: any liquid stains.
-    Further parameters, as in frz_shallow_staining: film, takes, half_life; capacity over 0 (m: m3 for each m2) with a rate (m/s) lets the ground absorb.
+    positions: (n, 3) of the vertices (m); triangles: (m, 3) vertex indices, which cannot change.
+    scalar: index of the scalar that stains; None: any liquid stains.
+    Further parameters, as in frz_shallow_staining: film, takes, half_life; with a capacity over 0 (m: m3 for each m2) the ground absorbs,
+    at a rate (m/s).
     """
 
     _destroy = "frz_shallow_stains_destroy"
@@ -34,7 +35,8 @@ class Stains(Handle):
         return f"of {self._count} vertices"
 
     def update(self, positions):
-        """Lets the liquid stain the ground, once a frame, with the vertices (n, 3) where they are now; what the ground has absorbed (m3)."""
+        """Lets the liquid stain the ground: call it once a frame, with the current positions (n, 3) of the vertices. Returns the volume (m3) that the
+        ground absorbed in this call."""
         positions, out = rows(positions, np.float32, 3), c.c_double()
         call("shallow_stains_update", self._ctx.pointer, self.pointer, self._shallow.pointer, view(positions), c.byref(out))
         return out.value
@@ -51,12 +53,12 @@ class Stains(Handle):
 
     @property
     def soaked(self):
-        """How soaked each vertex is, 0 to 1 of its capacity."""
+        """How soaked each vertex is, as a fraction of its capacity, 0 to 1."""
         return self._read("soaked")
 
     @property
     def absorbed(self):
-        """How much the ground has absorbed (m3)."""
+        """Total volume (m3) that the ground has absorbed."""
         out = c.c_double()
         call("shallow_stains_absorbed", self.pointer, c.byref(out))
         return out.value
@@ -66,5 +68,5 @@ class Stains(Handle):
         return saved("shallow_stains_save", self._ctx, self.pointer)
 
     def restore(self, state):
-        """Puts saved stains in place."""
+        """Restores saved stains."""
         call("shallow_stains_restore", self._ctx.pointer, self.pointer, state, len(state))

@@ -1,4 +1,4 @@
-"""Snow: its first layer, and the base layer that bodies press into."""
+"""Snow: the untouched layer, and the base layer that bodies press into."""
 
 import ctypes as c
 from typing import NamedTuple, Optional, Sequence
@@ -12,7 +12,8 @@ from .mesh import faces_of
 
 
 class Noise(NamedTuple):
-    """Ragged edges: amplitude and size in metres, -1 for the usual two and eight voxels; amplitude 0 for none."""
+    """Ragged edges: amplitude and size in metres. -1 means an amplitude of two voxels and a size of eight; an amplitude of 0
+    means no noise."""
 
     amplitude: float = -1.0
     size: float = -1.0
@@ -25,14 +26,14 @@ class Noise(NamedTuple):
 
 
 class Body(NamedTuple):
-    """A mesh that moves in a step: positions (n, 3) before and after, faces as frazil.Mesh takes them.
+    """A mesh that moves in a step: positions (n, 3) before and after, faces as in frazil.Mesh.
 
-    between: poses at equal times between the two; without, vertices move straight.
-    id: a number that stays with the body from step to step, different in all bodies of a step.
-    exact: no noise along its imprints.
-    friction: of grains against it, 0 to 10.
-    stick: with which it holds grains that touch it (weights of a grain), 0 to 1000.
-    compression: share of the snow that it removes that becomes no grains; None: as the grains have it.
+    between: poses at equal intervals between positions and positions_end; without them vertices move straight.
+    id: a number that the body keeps from step to step, different in all bodies of a step.
+    exact: whether its imprints have no noise.
+    friction: friction of grains against it, 0 to 10.
+    stick: adhesion to grains that touch it (weights of a grain), 0 to 1000.
+    compression: share of the snow removed by the body that becomes no grains; None: that of the grains.
     """
 
     positions: np.ndarray
@@ -68,8 +69,8 @@ def bodies_of(bodies):
 
 def snow_layer(ctx, depth=0.3, voxel_size=0.01, area=(-1.0, -1.0, 1.0, 1.0), ground=None, ground_height=0.0,
                top=None, statics=(), half_width=3.0):
-    """A layer of snow as a level set: on a rectangle (x0, z0, x1, z1), or on a ground mesh; of a depth, or up to a
-    top mesh; with static objects that it lies on."""
+    """A layer of snow as a level set: on a rectangle (x0, z0, x1, z1), or on a ground mesh; with a depth, or up to a
+    top mesh. statics are objects that the snow lies on."""
     desc = SnowDesc()
     call("snow_desc_init", c.byref(desc), c.sizeof(desc))
     desc.voxel_size, desc.half_width, desc.depth, desc.ground_height = voxel_size, half_width, depth, ground_height
@@ -82,7 +83,7 @@ def snow_layer(ctx, depth=0.3, voxel_size=0.01, area=(-1.0, -1.0, 1.0, 1.0), gro
 
 
 class Base(Handle):
-    """A layer of snow that bodies press into. state: bytes of save(), to go on from."""
+    """A layer of snow that bodies press into. state: bytes of save(), from which to resume."""
 
     _destroy = "frz_base_destroy"
 
@@ -92,7 +93,7 @@ class Base(Handle):
         super().__init__(made("base_create", ctx.pointer, c.byref(params), snow.pointer, state,
                               len(state) if state else 0))
         self._ctx = ctx
-        # One wrapper for each: what is lent must not be destroyed.
+        # Grids that the layer lends, and that must not be destroyed.
         lent = (library.frz_base_grid, library.frz_base_removed, library.frz_base_compression,
                 library.frz_base_touched)
         self._pointers = [function(self.pointer) for function in lent]
@@ -109,19 +110,19 @@ class Base(Handle):
         return params
 
     def set_params(self, tolerance=0.02, noise=Noise()):
-        """How bodies press from the next step on."""
+        """Sets how bodies press from the next step on."""
         params = self._params(tolerance, noise)
         call("base_set_params", self.pointer, c.byref(params))
 
     def step(self, bodies, dt, frame):
-        """Removes what bodies pass through in dt seconds (0: where they are); the report, as frz_base_report has it."""
+        """Removes the snow that bodies pass through in dt seconds (0: at their first positions). Returns a report (frz_base_report)."""
         descs, _kept = bodies_of(bodies)
         report = BaseReport(c.sizeof(BaseReport))
         call("base_step", self._ctx.pointer, self.pointer, descs, len(bodies), dt, frame, c.byref(report))
         return report
 
     def save(self):
-        """The state, for a cache: bytes that Base(..., state=...) goes on from."""
+        """The state, for a cache: bytes from which Base(..., state=...) resumes."""
         return saved("base_save", self._ctx, self.pointer)
 
     def dirty(self):
@@ -134,14 +135,14 @@ class Base(Handle):
 
     @property
     def bounds(self):
-        """The box that the snow lies in (m): its least and greatest corner."""
+        """The minimum and maximum corner (m) of the snow's bounding box, which no step enlarges."""
         low, high = (c.c_double * 3)(), (c.c_double * 3)()
         call("base_bounds", self.pointer, low, high)
         return tuple(low), tuple(high)
 
     @property
     def grid(self):
-        """The snow; the layer's own: it can be read and copied, and changes with the next step."""
+        """The snow. The layer owns this grid: it can be read and copied, and changes with the next step."""
         return Grid(self._pointers[0], self)
 
     @property
@@ -151,10 +152,10 @@ class Base(Handle):
 
     @property
     def compression(self):
-        """Part of its column's height that was removed, 0 to 1, at touched voxels."""
+        """At each touched voxel, the fraction of its column's height that was removed, 0 to 1."""
         return Grid(self._pointers[2], self)
 
     @property
     def touched(self):
-        """Frame of the last change, at touched voxels."""
+        """At each touched voxel, the frame of the last change."""
         return Grid(self._pointers[3], self)

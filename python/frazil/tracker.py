@@ -7,29 +7,29 @@ import numpy as np
 
 from ._library import Handle, ParticlesDesc, TrackerParams, TrackerReport, View, call, made, rows, saved, span, view
 
-# Arrays by their usual names: the number in the header, the type, and how many of it a vertex has.
+# Arrays by their usual names: the number in the header, the type, and the number of components.
 ARRAYS = {
     "P": (0, np.float32, 3), "P64": (1, np.float64, 3), "delta": (2, np.float32, 1), "flagged": (3, np.int32, 1),
 }
 WEIGHTINGS = {"affine": 0, "mean": 1}
 MATCHES = {"flagged": 0, "every": 1}
-# Kinds of triangles after a step, as Edits has them.
+# Kinds of triangles after a step: see Edits.
 WHOLE, PART, NEW = 0, 1, 2
 
 Edits = collections.namedtuple("Edits", "changed origins sources kinds before")
-Edits.__doc__ = """What a step made of the mesh of a tracker.
+Edits.__doc__ = """How a step changed the mesh of a tracker.
 
-changed: whether it changed vertices and triangles; else every one of them is what it was.
-origins: (n,) for each vertex the one that it was before; -1: it was made.
-sources: (t,) for each triangle the one that it was before, or is a part of; -1: neither.
-kinds: (t,) WHOLE, PART or NEW of frazil.tracker.
-before: (m, 3) places (m) in 64 bits to which the step took the vertices that there were.
+changed: whether it changed vertices or triangles.
+origins: (n,) for each vertex its index before the step; -1: it is new.
+sources: (t,) for each triangle the index of the triangle that it was before, or is a part of; -1: neither.
+kinds: (t,) for each triangle WHOLE, PART or NEW (constants of frazil.tracker).
+before: (m, 3) positions (m) in 64 bits to which the step moved the previous vertices.
 """
 
 
 class Particles:
     """The particles of a liquid at one time: positions (n, 3) in metres, velocities (n, 3) in m/s, ids (n,) of 64 bits. Ids or
-    velocities may be left out. What is an array of the right type is not copied: leave it as it is while a call reads it."""
+    velocities may be left out. Arrays of the right type are not copied: do not change them while a call reads them."""
 
     def __init__(self, positions, velocities=None, ids=None):
         self.positions = rows(positions, np.float64, 3)
@@ -43,11 +43,11 @@ class Particles:
 
     def __repr__(self):
         known = [name for name in ("velocities", "ids") if getattr(self, name) is not None]
-        return f"<frazil.Particles {len(self.positions)} with {' and '.join(known) or 'places only'}>"
+        return f"<frazil.Particles {len(self.positions)} with {' and '.join(known) or 'positions only'}>"
 
 
 def spacing(ctx, particles):
-    """The initial distance between particles (m), estimated; None where they are too few to tell, or lie at one place."""
+    """Estimates the initial distance between particles (m); None if there are too few of them, or too many at one position."""
     out = c.c_double()
     call("particles_spacing", ctx.pointer, c.byref(particles._desc()), c.byref(out))
     return out.value or None
@@ -61,12 +61,12 @@ class Tracker(Handle):
     spacing: initial distance r between particles (m): see frazil.spacing.
     weighting: "affine" or "mean".
     rebuild: whether the mesh is rebuilt where the liquid merges or splits; it must be closed: see Mesh.repaired. Read its triangles
-    anew after each step that changed them (the report says so), and take arrays of your own along by edits.
-    match: where a mesh that is rebuilt is matched to the liquid: "flagged", where its vertices find a change, or "every", all over it in
-    every step, which finds bubbles too and takes longer.
-    Further parameters, as in frz_tracker_params: cell and change (r), half_life (s), fade; min_drop, the least count of particles in a
-    part of a mesh that is rebuilt.
-    state: bytes of save(), to go on from.
+    again after each step that changed them (report.changed), and carry your own arrays along with edits.
+    match: where a mesh that is rebuilt is matched to the liquid: "flagged", where vertices are flagged, or "every", everywhere in every
+    step, which also finds bubbles and takes longer.
+    Further parameters, as in frz_tracker_params: cell and change (r), half_life (s), fade; min_drop, the minimum number of particles
+    in a part of a rebuilt mesh.
+    state: bytes of save(), from which to resume.
     """
 
     _destroy = "frz_tracker_destroy"
@@ -100,22 +100,22 @@ class Tracker(Handle):
         return params
 
     def set_params(self, **more):
-        """How the mesh follows from the next step on; those not given are the usual ones. Spacing, cell and rebuild stay."""
+        """Sets how the mesh follows from the next step on. Parameters not given take their defaults; spacing, cell and rebuild cannot change."""
         params = self._params(self._spacing, **{"rebuild": self._rebuild} | more)
         call("tracker_set_params", self.pointer, c.byref(params))
 
     def step(self, before, after, dt):
-        """Moves the mesh with its frazil.Particles from one time to another, dt seconds later; the report, as
-        frz_tracker_report has it."""
+        """Moves the mesh with its frazil.Particles from one time to another, dt seconds later. Returns a report
+        (frz_tracker_report)."""
         report = TrackerReport(c.sizeof(TrackerReport))
         call("tracker_step", self._ctx.pointer, self.pointer, c.byref(before._desc()), c.byref(after._desc()), dt,
              c.byref(report))
         return report
 
     def resculpt(self, mesh, particles):
-        """Puts an edited frazil.Mesh in the place of the tracked one, of any vertices and faces; particles: frazil.Particles of the
-        time to which the last step led. The distances that vertices keep are measured anew, and kept from there on. What fails leaves
-        the tracker as it was. A state that is saved later still takes the mesh that the tracker was made with."""
+        """Replaces the tracked mesh by an edited frazil.Mesh with any vertices and faces. particles: frazil.Particles at the end of the
+        last step. The distance of each new vertex from the particles' surface is measured now, and kept from then on. If the call fails,
+        the tracker stays as it was. States saved later still need the mesh that the tracker was created with."""
         call("tracker_resculpt", self._ctx.pointer, self.pointer, mesh.pointer, c.byref(particles._desc()))
 
     def __len__(self):
@@ -124,12 +124,12 @@ class Tracker(Handle):
         return count.value
 
     def __bool__(self):
-        """A handle is one, also without any vertices."""
+        """True also without any vertices."""
         return True
 
     def read(self, name):
-        """A copy of an array of the vertices, in the mesh's order: P (n, 3), P64, places in 64 bits, delta (n,), the distance kept
-        from the particles' surface (m), flagged (n,), 1 where the last step could not project."""
+        """A copy of an array of the vertices, in the mesh's order: P (n, 3); P64 (n, 3), positions in 64 bits; delta (n,), the distance that
+        a vertex keeps from the particles' surface (m); or flagged (n,): see FRZ_TRACKER_FLAGGED."""
         if name not in ARRAYS:
             raise ValueError(f"trackers have no array {name!r}, but {', '.join(ARRAYS)}")
         number, kind, width = ARRAYS[name]
@@ -144,7 +144,7 @@ class Tracker(Handle):
 
     @property
     def triangles(self):
-        """(t, 3) vertices of the triangles: those of the mesh that it was made with, until a step or resculpt() changes them."""
+        """(t, 3) vertex indices of the triangles: those of the mesh that it was created with, until a step or resculpt() changes them."""
         count = c.c_size_t()
         call("tracker_triangle_count", self.pointer, c.byref(count))
         out = np.empty((count.value, 3), np.uint32)
@@ -153,8 +153,8 @@ class Tracker(Handle):
 
     @property
     def edits(self):
-        """What the last step made of the mesh: Edits. Nothing before the first step, and after a start from a state; after
-        resculpt() everything was made."""
+        """How the last step changed the mesh: Edits. They report no change before the first step and after resuming from a state;
+        after resculpt() everything is new."""
         changed, before, count = c.c_uint32(), c.c_size_t(), c.c_size_t()
         call("tracker_edits", self.pointer, c.byref(changed), c.byref(before))
         call("tracker_triangle_count", self.pointer, c.byref(count))
@@ -165,19 +165,19 @@ class Tracker(Handle):
         return Edits(bool(changed.value), *arrays)
 
     def rest(self, first, now):
-        """(n, 3) places (m) in 64 bits where the liquid at each vertex was at the first frame; NaN where that is not known. first,
-        now: frazil.Particles with ids at the first frame, and at the time to which the last step led."""
+        """(n, 3) positions (m) in 64 bits where the liquid at each vertex was at the first frame; NaN if unknown. first, now:
+        frazil.Particles, with ids, at the first frame and at the end of the last step."""
         out = np.empty((len(self), 3), np.float64)
         call("tracker_read_rest", self._ctx.pointer, self.pointer, c.byref(first._desc()), c.byref(now._desc()), span(out))
         return out
 
     def eased(self, now, coming, dt, ahead=4):
-        """(n, 3) places (m) in 64 bits as they are to be shown: vertices that a step to come takes away, where the liquid merges or
-        splits, go towards what takes their place in the `ahead` steps (1 to 100, the same in all frames) before it. Others, and all
-        of a mesh that is not rebuilt, are at those of read("P64"). now: frazil.Particles of the time to which the last step led;
-        coming: a list of those of the frames to come, at most `ahead` of them, each dt seconds after the one before, fewer where the
-        shot ends. The steps to come are kept: step() with the same particles and dt takes over what is there. The tracker stays as it
-        is."""
+        """(n, 3) displayed positions (m) in 64 bits. Vertices that a coming step will remove, where the liquid merges or splits, already
+        move towards the mesh that will replace them, in the `ahead` steps (1 to 100, the same in all frames) before that step. All
+        other vertices, and those of a mesh that is not rebuilt, are at read("P64"). now: frazil.Particles at the end of the last step;
+        coming: a list of the particles of the coming frames, each dt seconds after the previous one: `ahead` of them, or fewer where
+        the shot ends. The coming steps are kept: step() with the same particles and dt only adopts the result. The tracker does not
+        change."""
         descs = [particles._desc() for particles in coming]
         pointers = (c.POINTER(ParticlesDesc) * len(descs))(*(c.pointer(desc) for desc in descs))
         out = np.empty((len(self), 3), np.float64)
@@ -186,5 +186,5 @@ class Tracker(Handle):
         return out
 
     def save(self):
-        """The state, for a cache: bytes that Tracker(..., state=...) goes on from."""
+        """The state, for a cache: bytes from which Tracker(..., state=...) resumes."""
         return saved("tracker_save", self._ctx, self.pointer)
