@@ -12,11 +12,11 @@
  * Handles: the caller owns what it receives through an out-pointer, and destroys it with the destroy function of its
  * kind, which ignores NULL. A returned const pointer is lent. Never pass memory of frazil to free(). Only one call at a
  * time may use a handle (else FRZ_ERROR_BUSY), but any number may read it; handles may move between threads, and
- * distinct handles work in parallel. A handle that saw FRZ_ERROR_INTERNAL returns FRZ_ERROR_POISONED and can only be
- * destroyed.
+ * distinct handles work in parallel. After FRZ_ERROR_INTERNAL the handles of that call return FRZ_ERROR_POISONED and can
+ * only be destroyed.
  *
  * Input arrays: frz_view, lent for the duration of the call. Output arrays: frz_span, memory of the caller; query the
- * count first. Counts, strides, indices and numbers that are not finite are checked once, on entry.
+ * count first. Counts, strides, indices and the finiteness of numbers are checked once, on entry.
  *
  * Structs with a struct_size: set it to sizeof, or call the init function. The library may be newer than the header:
  * fields that the header does not have take their default values. It must not be older, or of another major version of
@@ -199,7 +199,7 @@ enum frz_status
      */
     FRZ_ERROR_INTERNAL = 7,
     /**
-     * The handle saw FRZ_ERROR_INTERNAL before: it can only be destroyed.
+     * An earlier call with the handle returned FRZ_ERROR_INTERNAL: it can only be destroyed.
      */
     FRZ_ERROR_POISONED = 8,
     /**
@@ -1936,8 +1936,8 @@ typedef struct {
     double change;
     /**
      * Time (s) in which half of the detail fades, above 0; default infinite: it does not fade. Where the mesh's attribute "detail", of one
-     * float, is 1, detail never fades; where it is 0, it fades at this rate. A new vertex takes the mean of this attribute over those of
-     * its neighbours that existed before, 0 without any.
+     * float, is 1, detail never fades; where the attribute is 0, detail fades at this rate. A new vertex takes the mean of this attribute
+     * over those of its neighbours that existed before, 0 without any.
      */
     double half_life;
     /**
@@ -5026,7 +5026,7 @@ frz_status frz_shallow_stains_save(frz_context *context,
  * Restores saved stains: with the liquid's state of the same frame everything continues to the same bytes.
  *
  * state: bytes bytes of frz_shallow_stains_save. FRZ_ERROR_FILE, with the stains unchanged, if they are damaged, or of other triangles, of
- *     a liquid with other cells or heights, or of ground that absorbs where this does not.
+ *     a liquid with other cells or heights, or of ground that absorbs where this ground does not.
  * bytes: size of state.
  *
  * One thread at a time.

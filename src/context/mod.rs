@@ -86,7 +86,8 @@ impl Context {
         self.cancel.begin()
     }
 
-    /// As [`Context::begin`], for work in real time: it takes no lock and allocates nothing, and the count of phases goes on.
+    /// As [`Context::begin`], for work in real time: it takes no lock, allocates nothing, and does not restart the
+    /// count of phases.
     pub fn begin_light(&self) -> Running {
         self.cancel.begin()
     }

@@ -8,7 +8,7 @@ use super::locking::lock;
 /// How long one phase took, over all its runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PhaseTime {
-    /// The phase's verb.
+    /// Name of the phase.
     pub name: &'static str,
     /// Wall-clock time, summed over the runs.
     pub time: Duration,

@@ -7,13 +7,13 @@ use super::locking::lock;
 /// What is being done, for a progress display.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Progress {
-    /// The phase's verb, empty between phases.
+    /// Name of the running phase; empty between phases.
     pub phase: &'static str,
     /// Phases finished since the context was made or reset.
     pub phases_done: usize,
-    /// Fraction of the running phase that is done, 0 to 1; none where it is not known.
+    /// Fraction of the running phase that is done, 0 to 1; none if unknown.
     pub part: Option<f32>,
-    /// Fraction of the running step that is done, 0 to 1, all its phases counting the same; none outside of
+    /// Fraction of the running step that is done, 0 to 1, with equal weights for all its phases; none outside of
     /// [`super::Context::step`]. It never decreases within a step.
     pub fraction: Option<f32>,
 }

@@ -28,7 +28,7 @@ pub enum frz_status {
     FRZ_ERROR_OPENVDB = 6,
     /// An internal invariant was violated: a bug in frazil. The objects of the call are poisoned.
     FRZ_ERROR_INTERNAL = 7,
-    /// The handle saw FRZ_ERROR_INTERNAL before: it can only be destroyed.
+    /// An earlier call with the handle returned FRZ_ERROR_INTERNAL: it can only be destroyed.
     FRZ_ERROR_POISONED = 8,
     /// The handle is in use by another call: on another thread, or the one within which this call is made.
     FRZ_ERROR_BUSY = 9,

@@ -226,7 +226,7 @@ pub unsafe extern "C" fn frz_shallow_stains_save(
 /// Restores saved stains: with the liquid's state of the same frame everything continues to the same bytes.
 ///
 /// state: bytes bytes of frz_shallow_stains_save. FRZ_ERROR_FILE, with the stains unchanged, if they are damaged, or of other triangles, of
-///     a liquid with other cells or heights, or of ground that absorbs where this does not.
+///     a liquid with other cells or heights, or of ground that absorbs where this ground does not.
 /// bytes: size of state.
 ///
 /// One thread at a time.

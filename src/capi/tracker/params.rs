@@ -51,8 +51,8 @@ pub struct frz_tracker_params {
     /// merged or split there.
     pub change: f64,
     /// Time (s) in which half of the detail fades, above 0; default infinite: it does not fade. Where the mesh's attribute "detail", of one
-    /// float, is 1, detail never fades; where it is 0, it fades at this rate. A new vertex takes the mean of this attribute over those of
-    /// its neighbours that existed before, 0 without any.
+    /// float, is 1, detail never fades; where the attribute is 0, detail fades at this rate. A new vertex takes the mean of this attribute
+    /// over those of its neighbours that existed before, 0 without any.
     pub half_life: f64,
     /// How much detail fades where the mesh is strained, 0 to 1000: a change of lengths by a factor of e leaves exp(-fade) of the detail.
     /// Default 0: it does not fade.
