@@ -6,13 +6,13 @@ use crate::numeric::digits;
 /// A liquid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Liquid {
-    /// Kinematic viscosity nu (m2/s), 0 and up; of a shear-thinning liquid, at rest.
+    /// Kinematic viscosity nu (m2/s), 0 and up; for a liquid that thins under shear, the viscosity at rest.
     pub viscosity: f64,
     /// How it thins under shear; None: it does not.
     pub thinning: Option<Carreau>,
 }
 
-/// Carreau's law: nu = nu_inf + (nu - nu_inf) (1 + (lambda rate)^2)^((n - 1) / 2), of the shear rate at the ground, 3 u / H.
+/// Carreau's law: a viscosity of nu_inf + (nu - nu_inf) (1 + (lambda rate)^2)^((n - 1) / 2) at the shear rate 3 u / H at the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Carreau {
     /// nu_inf (m2/s): viscosity under strong shear; at most the viscosity at rest.

@@ -10,7 +10,7 @@
 //! | strip | 16 adjacent columns of one layer along x: the unit of SIMD loads |
 //! | pipe | joins columns of adjacent cells; *regular* pipes join columns of one layer; *links* are all others, and also lead out of the domain |
 //! | donor, receiver | the columns that liquid leaves and enters through a pipe |
-//! | cliff, overflow edge | a drop where liquid may fall freely; a link that it falls from in a step |
+//! | cliff, overflow edge | a drop where liquid may fall freely; a link over which it falls in a step |
 //! | flux | volume per time through a pipe |
 //! | transfer | what a flux moves in a step, in whole units; its *remainder* waits for the next step |
 //! | unit | the resolution of heights and depths; these are integers, so that liquid is neither lost nor created |

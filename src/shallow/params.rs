@@ -27,10 +27,10 @@ pub struct Params {
     pub thickening: Option<Thickening>,
     /// How liquid falls freely over edges; None: it arrives below at once. Fixed at creation.
     pub falls: Option<Falls>,
-    /// Speed (m/s) below which liquid comes to rest, where its surface is also so level that in 1/60 s it would not exceed this speed from
-    /// rest; 0 to 0.01. 1e-6 works well: a micrometre a second, and a slope of 6e-6. Pools at rest sleep and cost nothing; while liquid
-    /// moves, the test makes a step a third slower. 0: never. It has no effect with wall friction ([`Friction::Walls`]), where flowing
-    /// liquid drags along what is beside it.
+    /// Speed (m/s), 0 to 0.01, below which liquid comes to rest where its surface is also so level that, starting from rest, it would not
+    /// exceed this speed within 1/60 s. 1e-6 works well: a micrometre a second, and a slope of 6e-6. Pools at rest sleep and cost nothing;
+    /// while liquid moves, the test makes a step a third slower. With 0, liquid never comes to rest. It has no effect with wall friction
+    /// ([`Friction::Walls`]), where flowing liquid drags along what is beside it.
     pub rest: f64,
 }
 
@@ -62,8 +62,8 @@ pub enum Friction {
     #[default]
     Ground,
     /// Also at walls and ceilings, and between liquids that flow side by side: the discharge of ducts and channels of any width agrees with
-    /// theory to a few percent (Galerkin's method with the profile of a film). Films thinner than a sixteenth of a cell cost nothing more.
-    /// It has no effect without viscosity, or with [`Section::Whole`]. A closed border is a wall, too. Takes 86 bytes a column.
+    /// theory to a few percent (Galerkin's method with the profile of a film). Films thinner than a sixteenth of a cell take no more time.
+    /// It has no effect without viscosity, or with [`Section::Whole`]. A closed border is a wall, too. Takes 86 more bytes a column.
     Walls,
 }
 
@@ -118,7 +118,7 @@ impl Params {
     }
 }
 
-/// How viscosity depends on a scalar: it is the liquid's own up to `from`, `times` that from `to` on, and linear in the concentration in
+/// How viscosity depends on a scalar: it is the liquid's own up to the concentration `from`, `times` as high from `to` on, and linear in
 /// between.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Thickening {
@@ -126,9 +126,9 @@ pub struct Thickening {
     pub scalar: usize,
     /// Concentration up to which viscosity is the liquid's own, in the scalar's own measure.
     pub from: f64,
-    /// Concentration from which on it is `times` that; it may be below `from`.
+    /// Concentration from which on viscosity is `times` the liquid's own; it may be below `from`.
     pub to: f64,
-    /// 1e-6 to 1e9.
+    /// Factor of the viscosity from `to` on: 1e-6 to 1e9.
     pub times: f64,
 }
 
@@ -141,7 +141,7 @@ impl Thickening {
         let Self { from, to, times, .. } = *self;
         ensure(
             from.is_finite() && to.is_finite() && from != to,
-            format_args!("thickening.from = {from} and thickening.to = {to} are not finite and apart"),
+            format_args!("thickening.from = {from} and thickening.to = {to} are not finite and different"),
         )?;
         if !(1e-6..=1e9).contains(&times) {
             return Err(Error::argument(format!("thickening.times = {times} is not within 1e-6 to 1e9")));

@@ -87,7 +87,7 @@ pub struct Balance {
     pub held: f64,
     /// In the air ([`Params::falls`]).
     pub falling: f64,
-    /// Units unaccounted for: 0.
+    /// Units unaccounted for; always 0.
     pub error: i64,
 }
 
@@ -177,7 +177,7 @@ impl Shallow {
         &self.columns
     }
 
-    /// H of every column index (units).
+    /// Depth H of every column index (units).
     pub fn depths(&self) -> &[i32] {
         self.flow.depths()
     }
@@ -219,7 +219,7 @@ impl Shallow {
         self.flow_points.set(&self.columns, points, which)
     }
 
-    /// Adds a depth (m; negative: removes it) to a column, within 0 and its ceiling; returns the depth added (m).
+    /// Adds a depth (m; negative: removes it) to a column, as far as its liquid and its ceiling allow; returns the depth added (m).
     pub fn pour(&mut self, column: usize, depth: f64) -> f64 {
         let heights = self.columns.heights;
         let units = (depth / heights.unit).round().clamp(-4e9, 4e9) as i64;

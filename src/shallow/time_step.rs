@@ -29,9 +29,9 @@ pub struct Measures {
     pub still_level: i32,
 }
 
-/// The longest stable step (s) for liquid of a depth (m): the largest dt with P g A' dt^2 / dx^2 <= 1/q + zeta, for P pipes a column, and
-/// 1/q = 1 + 3 dt nu / H^2. With four pipes and no loss this is dt = dx / (c sqrt 2). Infinite where nothing limits it, as on dry ground.
-/// `frame` is the time left in the frame (s).
+/// The longest stable step (s) for liquid of a depth (m): the largest dt with P g A' dt^2 / dx^2 <= 1/q + zeta, for P pipes a column, with
+/// 1/q = 1 + 3 dt nu / H^2 and A' = H (dx with [`Section::Whole`]). With four pipes and no loss this is dt = dx / (c sqrt 2). Infinite
+/// where nothing limits it, as on dry ground. `frame` is the time left in the frame (s).
 pub fn longest_stable(params: &Params, measures: &Measures, depth: f64, frame: f64) -> f64 {
     let g = -params.gravity[1];
     let height = if params.section == Section::Wetted { depth } else { measures.cell };
@@ -74,7 +74,8 @@ pub struct FrameProgress<'a> {
     pub halvings: u32,
 }
 
-/// A step keeps the last length while that is at least this part of the longest stable one: each change of the length adds energy to waves.
+/// A step is as long as the last one while that is stable and at least this part of the longest stable length: each change of the length
+/// adds energy to waves.
 const STEADY: f64 = 0.45;
 
 /// The length of the next step (s).
@@ -98,7 +99,7 @@ pub fn max_halvings(params: &Params) -> u32 {
 }
 
 /// Maximum transfer of a pipe of a fast film in a step, as part of the donor's depth. A disturbance travels at three times the film's speed
-/// or, where this no longer grows with depth, at that speed. It must stay within a cell a step everywhere, or it would grow.
+/// or, where that speed no longer grows with depth, at the film's own speed. If it travelled more than a cell in a step, it would grow.
 const MAX_FILM_TRANSFER: f32 = 1.0 / 3.0;
 
 /// Mean of phi^2, where phi is the profile of a film's velocity over its depth (`solver::lateral_friction`).
@@ -124,14 +125,14 @@ fn rest_drop(params: &Params, measures: &Measures) -> i32 {
     if rest_speed(params) > 0.0 { (fall / measures.unit).round().clamp(1.0, 1e6) as i32 } else { 0 }
 }
 
-/// Maximum flux, over the depth in its section, at which liquid comes to rest in a step of `dt` (s). A surface that counts as level never
-/// drives liquid at rest beyond it.
+/// Maximum flux, divided by the depth in its section, at which liquid comes to rest in a step of `dt` (s). A surface that counts as level
+/// never brings liquid from rest to a larger flux.
 fn rest_flux(params: &Params, measures: &Measures, dt: f64) -> f64 {
     let driven = 1.001 * drive(params, measures, dt) * f64::from(rest_drop(params, measures));
     (rest_speed(params) * dt / measures.cell).max(driven)
 }
 
-/// What gravity adds to the drop of the surface over a cell, along x and along z (units).
+/// What tilted gravity adds to the drop of the surface over a cell, along x and along z (units).
 fn tilt(params: &Params, measures: &Measures) -> [i32; 2] {
     let [x, y, z] = params.gravity;
     [x, z].map(|along| (along / -y * measures.cell / measures.unit).round().clamp(-1e9, 1e9) as i32)

@@ -2,9 +2,9 @@
 //!
 //! A body is a pillar in each cell that it covers (`terrain/shapes.rs`). Its faces are where liquid touches pillars: below, above, and at
 //! the sides, where the pillar of one cell and the liquid of the next are at the same height. The weight of the liquid above a face acts on
-//! it: rho g (eta - y), integrated exactly over the pillar, with the head of a flooded column instead of eta. A submerged ball has the
-//! buoyancy of its pillars. The stagnation pressure, rho w^2 / 2, acts on faces that the liquid runs into, and shear acts along all faces:
-//! of a film, of a flooded gap, or of a wall half a cell away.
+//! it: rho g (eta - y) at the height y, where eta is the liquid's surface (in a flooded column, its head), integrated exactly over the
+//! pillar. A submerged ball has the buoyancy of its pillars. The stagnation pressure, rho w^2 / 2, acts on faces that the liquid runs into,
+//! and shear acts along all faces: over the depth of a film or of a flooded gap, or over half a cell at the sides.
 
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
@@ -16,7 +16,8 @@ use crate::shallow::solver::SLACK;
 use crate::shallow::system::Shallow;
 use crate::shallow::terrain::shapes::Shape;
 
-/// Minimum height, for drag, of a flooded gap (cells): some pillars of a round body come arbitrarily close to the ground.
+/// For drag, a flooded gap that is lower than this (cells) counts as this high: some pillars of a round body come arbitrarily close to the
+/// ground.
 const MIN_GAP: f64 = 0.05;
 
 /// The load on a body.
@@ -45,9 +46,9 @@ struct FaceSums<'a> {
     drag: DVec3,
     torque: DVec3,
     wetted: f64,
-    /// Height of its sides that touches liquid (units), summed.
+    /// Height over which its sides touch liquid (units), summed over all side faces.
     contact: f64,
-    /// The same, weighted by the level of the liquid and by the base of its column.
+    /// The same sum, weighted by the level of the liquid and by the base of its column.
     levels: f64,
     bases: f64,
 }
@@ -69,7 +70,8 @@ impl Shallow {
     /// 1,000). The liquid below a body is as the last step left it: after [`Shallow::set_bodies`], step first. Allocates nothing.
     ///
     /// # Errors
-    /// `Argument`: a density that is not positive and finite, not one velocity and one output for each body, a velocity that is not finite.
+    /// `Argument`: a density that is not positive and finite, a count of velocities or of outputs that is not that of the bodies, a
+    /// velocity that is not finite.
     pub fn loads(&self, density: f64, velocities: &[[f64; 3]], out: &mut [Load]) -> Result<()> {
         if !(density > 0.0 && density.is_finite()) {
             return Err(Error::argument(format!("density = {density} kg/m3 is not positive and finite")));
@@ -148,7 +150,8 @@ impl Shallow {
         DVec3::new(u, 0.0, w)
     }
 
-    /// Height of a pillar below the surface (units); `level` and `ground` are the surface and the ground at the sides of the body.
+    /// Height of the part of a pillar below the surface (units); `level` and `ground` are the heights of the surface and of the ground at
+    /// the sides of the body.
     fn submerged(&self, cell: [usize; 2], [bottom, top]: [i32; 2], [level, ground]: [f64; 2]) -> f64 {
         let [below, above] = self.ends(cell, [bottom, top]);
         let (bottom, top) = (f64::from(bottom), f64::from(top));

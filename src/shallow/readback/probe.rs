@@ -73,7 +73,7 @@ impl View<'_> {
     /// As [`View::volume`], for boxes of two corners each.
     ///
     /// # Errors
-    /// As [`View::volume`], naming the box; `Argument` also if there is not one output for each. Nothing is written.
+    /// As [`View::volume`], naming the box; `Argument` also if there is not one output for each box. In all cases nothing is written.
     pub fn volumes(&self, boxes: &[[[f64; 3]; 2]], out: &mut [f64]) -> Result<()> {
         check_room(out.len(), "volumes", boxes.len(), "boxes")?;
         for (at, [low, high]) in boxes.iter().enumerate() {
@@ -85,8 +85,8 @@ impl View<'_> {
         Ok(())
     }
 
-    /// The mean concentration of a scalar over the liquid in a box, as in [`View::volume`], in its own unit: each column is weighted by its
-    /// liquid in the box. 0 if there is none.
+    /// The mean concentration of a scalar over the liquid in a box, as in [`View::volume`], in the scalar's own unit: each column is
+    /// weighted by its liquid in the box. 0 if there is no liquid.
     ///
     /// # Errors
     /// As [`View::volume`]; `Argument` also if there is no such scalar.
@@ -113,8 +113,8 @@ impl View<'_> {
         self.columns.layers()
     }
 
-    /// The column at a point (m): in its cell, the column that contains the point between ground and ceiling, else the nearest one, or the
-    /// lower of two equally near. None outside the domain, and where the ground has a hole.
+    /// The column at a point (m): in the cell of the point, the column that contains the point between ground and ceiling, else the nearest
+    /// one, or the lower of two equally near. None outside the domain, and where the ground has a hole.
     pub fn at(&self, point: [f64; 3]) -> Option<Reading> {
         let [x, y, z] = point;
         let heights = &self.columns.heights;
@@ -183,8 +183,8 @@ impl View<'_> {
         units
     }
 
-    /// Calls `visit` with the columns of a box in active strips, and the units of each that lie in it. Heights of the box are rounded to
-    /// units.
+    /// Calls `visit` with each column of a box in active strips, and with the units of its liquid that lie in the box. Heights of the box
+    /// are rounded to units.
     #[inline(always)]
     fn each_within(&self, low: [f64; 3], high: [f64; 3], mut visit: impl FnMut(usize, i64)) {
         let columns = self.columns;

@@ -48,8 +48,8 @@ impl Snapshot {
         snapshot
     }
 
-    /// Replaces the contents by the current liquid, which may be another one. Copies only strips that have or had liquid, and the columns
-    /// if the terrain has changed. Allocates nothing, unless there are more columns than ever before.
+    /// Replaces the contents by the current state of a liquid, which may be another one than before. Copies only strips that have or had
+    /// liquid, and the columns if the terrain has changed. Allocates nothing, unless there are more columns than ever before.
     pub fn take(&mut self, shallow: &Shallow) {
         if self.terrain != shallow.identity.number {
             self.terrain = shallow.identity.number;
@@ -104,12 +104,13 @@ impl Snapshot {
         &self.depth
     }
 
-    /// As [`Shallow::velocity`], of every column index: the mean velocity over its depth (m/s), along x and z.
+    /// As [`Shallow::velocity`], for every column index: the mean velocity over its depth (m/s), along x and z.
     pub fn velocities(&self) -> &[[f32; 2]] {
         &self.velocity
     }
 
-    /// Concentrations of a scalar by column index, in its own unit, as [`Shallow::concentration`]; empty if there is no such scalar.
+    /// Concentrations of a scalar by column index, in the scalar's own unit, as [`Shallow::concentration`]; empty if there is no such
+    /// scalar.
     pub fn concentrations(&self, scalar: usize) -> &[f32] {
         self.concentrations.get(scalar).map_or(&[], |numbers| &numbers[..])
     }
@@ -136,7 +137,7 @@ impl Shallow {
         self.flow.active()
     }
 
-    /// As [`Shallow::velocity`], of every column index: the mean velocity over its depth (m/s), along x and z.
+    /// As [`Shallow::velocity`], for every column index: the mean velocity over its depth (m/s), along x and z.
     ///
     /// # Errors
     /// `Argument`: there is not one output for each index.

@@ -54,7 +54,7 @@ impl Detail {
         own + self.fine.save_size() + self.coarse.save_size() + CHECKSUM
     }
 
-    /// Replaces the liquid's state, and its near cells, by a saved one: it continues as the saved liquid did, to the same bytes, with the
+    /// Replaces the liquid's state and its near cells by saved ones: it then continues as the saved liquid did, to the same bytes, with the
     /// same parameters, flow points and bodies, which must be set first ([`crate::shallow::Shallow::restore`]). Nothing is allocated if the
     /// near cells are already those of the state.
     ///
@@ -69,7 +69,7 @@ impl Detail {
             saved.apply(self);
             return Ok(());
         }
-        // Its states fit the columns only with these near cells.
+        // The saved states fit the columns only with the saved near cells.
         let own = self.save();
         self.set_near(saved.near.clone())?;
         let result = saved.check(self);

@@ -91,5 +91,5 @@ pub(super) fn require(holds: bool, wrong: impl Display) -> Result<()> {
     if holds { Ok(()) } else { Err(refused(&wrong.to_string())) }
 }
 
-/// Valid range of sums of units: three of them fit 64 bits.
+/// Valid range of sums of units: the total of three fits 64 bits.
 pub(super) const SUMS: RangeInclusive<i64> = -(1 << 61)..=1 << 61;

@@ -102,7 +102,7 @@ pub(super) struct Header {
     pub(super) tick: u64,
 }
 
-/// Bytes of a scalar's part, except those of columns and parcels.
+/// Bytes of a scalar's part before its amounts.
 pub(super) const SCALAR: usize = 32 + 16 * ACCOUNTS;
 
 impl Header {

@@ -1,7 +1,7 @@
 //! Saves the state of the liquid as bytes and restores it; a restored liquid continues with the same bytes.
 //!
-//! Numbers are little-endian and uncompressed: a game that saves every second can spend a fraction of a millisecond on it. Only the columns
-//! of active strips are stored, so that a puddle in a large domain is small.
+//! Numbers are little-endian and uncompressed, so that saving takes only a fraction of a millisecond: a game may do it every second. Only
+//! the columns of active strips are stored, so that a puddle in a large domain is small.
 //!
 //! | part | bytes |
 //! |---|---|
@@ -85,10 +85,10 @@ impl Shallow {
 
     /// Replaces the liquid's state by a saved one: with the same parameters it continues as the saved liquid did, to the same bytes.
     ///
-    /// If the saved liquid had flow points, set the same ones first ([`Shallow::set_flows`]): the units that each has pending and has moved
-    /// are restored in order. Positions and rates of flow points are not compared; the border and a hash of the terrain are. Set the same
-    /// scalars first, too; the concentrations of sources and pours are not restored. [`Shallow::last_steps`] is empty afterwards. Nothing
-    /// is allocated.
+    /// If the saved liquid had flow points, set the same ones first ([`Shallow::set_flows`]): the units that each has pending, and those
+    /// that it has moved, are restored by the index of the point. Positions and rates of flow points are not compared; the border and a
+    /// hash of the terrain are. Set the same scalars first, too; the concentrations of sources and pours are not restored.
+    /// [`Shallow::last_steps`] is empty afterwards. Nothing is allocated.
     ///
     /// # Errors
     /// `Bytes`, and the liquid is as it was: not a state of a shallow liquid; another version; truncated or damaged; another terrain or
@@ -208,7 +208,7 @@ impl<'a> Saved<'a> {
         })
     }
 
-    /// Whether it belongs to this liquid, and all numbers are valid.
+    /// Checks that it belongs to this liquid, and that all numbers are valid.
     fn check(&self, shallow: &Shallow) -> Result<()> {
         let (header, counts) = (&self.header, &self.header.counts);
         require(header.terrain == shallow.identity.hash(&shallow.columns), "belongs to another terrain")?;
@@ -232,7 +232,7 @@ impl<'a> Saved<'a> {
         }
         for (at, (saved, (kind, ..))) in self.points.iter().zip(own).enumerate() {
             if u32::from_le_bytes(part(saved, 0)) != code_of_kind(kind) {
-                return Err(refused(&format!("has another kind of flow point {at} than the liquid")));
+                return Err(refused(&format!("has flow point {at} of another kind than the liquid")));
             }
         }
         self.scalars.check_laws(shallow)?;
@@ -397,7 +397,7 @@ fn is_over(numbers: &[[u8; 4]], max: f32) -> bool {
     numbers.iter().fold(0, |bad, number| bad | (max - magnitude(number))) < 0
 }
 
-/// Whether ranges are non-empty, in order, disjoint, and end by `count`.
+/// Whether ranges are non-empty, in order and disjoint, and the last ends at `count` or before.
 fn is_in_order(mut ranges: impl Iterator<Item = Range<usize>>, count: usize) -> bool {
     let mut end = 0;
     ranges.all(|range| {

@@ -93,10 +93,10 @@ impl<'a> Scalars<'a> {
             let (law, half) = code_of_law(*law);
             let saved_law = (u32::from_le_bytes(part(saved.head, 0)), saved.number(16).to_bits());
             if saved_law != (law, half.to_bits()) {
-                return Err(refused(&format!("has another law of scalar {at} than the liquid")));
+                return Err(refused(&format!("has another law for scalar {at} than the liquid")));
             }
             if saved.number(8).to_bits() != range.to_bits() {
-                return Err(refused(&format!("has another range of scalar {at} than the liquid")));
+                return Err(refused(&format!("has another range for scalar {at} than the liquid")));
             }
         }
         Ok(())

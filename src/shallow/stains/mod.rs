@@ -1,9 +1,9 @@
 //! Stains on the ground, which fade, and liquid that the ground absorbs. Both are stored at the vertices of the terrain's mesh, and move
 //! with it where it deforms.
 //!
-//! A vertex is *wet* while a column of its cell has a film within a cell's edge of its height (`wet.rs`). Then its *stain* approaches that
-//! of the liquid there; after it has dried, half of the stain fades in each half-life. Fading is computed only when a vertex is read or
-//! becomes wet again: dry ground costs nothing. Absorbing ground takes whole units, which the liquid's balance counts.
+//! A vertex is *wet* while a column of its cell has a film within a cell's edge of its height (`wet.rs`). Then its *stain* approaches the
+//! value that the liquid there gives; after the vertex has dried, half of the stain fades in each half-life. Fading is computed only when a
+//! vertex is read or becomes wet again: dry ground costs nothing. Absorbing ground takes whole units, which the liquid's balance counts.
 
 mod state;
 mod wet;
@@ -24,8 +24,8 @@ const INVISIBLE: f64 = 1e-6;
 /// How liquid stains the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Staining {
-    /// The scalar that stains, by its concentration over its range, from 0 to 1: liquid without it washes stains off. None: any liquid
-    /// stains, fully.
+    /// The scalar that stains: a stain is its concentration divided by its range, 0 to 1, so that liquid without it washes stains off.
+    /// None: any liquid stains, fully.
     pub scalar: Option<usize>,
     /// Minimum depth of a film that wets (m), 0 and up. Default: 1e-5.
     pub film: f64,
@@ -66,7 +66,9 @@ impl Staining {
         let Some(Absorbing { capacity, rate }) = self.absorbs else { return Ok(()) };
         check_not_negative("absorbs.rate", rate)?;
         if !(capacity > 0.0 && capacity <= 1e3) {
-            return Err(Error::argument(format!("absorbs.capacity = {capacity} m is not within 0 to 1000")));
+            return Err(Error::argument(format!(
+                "absorbs.capacity = {capacity} m is not above 0 and at most 1000"
+            )));
         }
         Ok(())
     }
@@ -107,7 +109,9 @@ impl Stains {
         staining.validate()?;
         let scalars = liquid.scalars().len();
         if let Some(scalar) = staining.scalar.filter(|&scalar| scalar >= scalars) {
-            return Err(Error::argument(format!("there is no scalar {scalar} among {scalars} that stains")));
+            return Err(Error::argument(format!(
+                "there is no scalar {scalar} among {scalars} to stain with"
+            )));
         }
         let count = positions.len();
         if let Some(bad) = triangles.iter().flatten().find(|&&vertex| vertex as usize >= count) {
@@ -144,12 +148,12 @@ impl Stains {
         self.stain.is_empty()
     }
 
-    /// Advances to the liquid's time; call it once a frame, with the vertices of the ground as the liquid has it now: `positions` (m).
-    /// Allocates nothing after the first call. Returns the volume that the ground has absorbed since the last call (m3).
+    /// Advances to the liquid's time; call it once a frame. `positions` (m) are those of the vertices on the ground that the liquid has
+    /// now. Allocates nothing after the first call. Returns the volume that the ground has absorbed since the last call (m3).
     ///
     /// # Errors
-    /// `Argument`, and nothing changes: a count of vertices other than the mesh's; one that is not finite; a liquid with other units, or
-    /// that no longer has the scalar.
+    /// `Argument`, and nothing changes: a count of vertices other than the mesh's; a vertex that is not finite; a liquid with other units,
+    /// or that no longer has the scalar.
     pub fn update(&mut self, liquid: &mut Shallow, positions: &[Vec3]) -> Result<f64> {
         self.check(liquid, positions)?;
         let (last, now) = (self.time, liquid.time());
@@ -214,7 +218,7 @@ impl Stains {
         (0..self.len()).map(|vertex| self.stain_at(vertex, self.time) as f32)
     }
 
-    /// Absorbed liquid at each vertex, 0 to 1 of its capacity; 0 if the ground does not absorb.
+    /// Absorbed liquid at each vertex as a share of its capacity, 0 to 1; 0 if the ground does not absorb.
     ///
     /// # Errors
     /// As [`Stains::stains`].
@@ -255,7 +259,9 @@ impl Stains {
         }
         let scalars = liquid.scalars().len();
         if let Some(scalar) = self.staining.scalar.filter(|&scalar| scalar >= scalars) {
-            return Err(Error::argument(format!("there is no scalar {scalar} among {scalars} that stains")));
+            return Err(Error::argument(format!(
+                "there is no scalar {scalar} among {scalars} to stain with"
+            )));
         }
         check_finite(positions)
     }

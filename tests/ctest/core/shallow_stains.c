@@ -287,7 +287,7 @@ static void thickening(frz_context *ctx) {
             params.thickening_times = (double)NAN;
             FAILS(frz_shallow_set_params(shallow, &params), WRONG, "thickening.times = NaN");
             params.thickening_times = 2, params.thickening_to = 0;
-            FAILS(frz_shallow_set_params(shallow, &params), WRONG, "thickening.to = 0 are not finite and apart");
+            FAILS(frz_shallow_set_params(shallow, &params), WRONG, "thickening.to = 0 are not finite and different");
             params.thickening_scalar = FRZ_SHALLOW_NO_SCALAR, params.friction = FRZ_SHALLOW_WALLS;
             FAILS(frz_shallow_set_params(shallow, &params), WRONG, "friction cannot change");
             params.friction = 2;

@@ -332,9 +332,9 @@ fn a_state_of_other_scalars_is_refused() {
     let [dye, age, warmth] = three();
     let other = Scalar { law: Law::Decays(0.6), ..warmth.clone() };
     let law = refusal(&[dye.clone(), age.clone(), other]);
-    assert_eq!(law, "the saved state has another law of scalar 2 than the liquid");
+    assert_eq!(law, "the saved state has another law for scalar 2 than the liquid");
     let range = refusal(&[dye, Scalar { range: 20.0, ..age.clone() }, warmth.clone()]);
-    assert_eq!(range, "the saved state has another range of scalar 1 than the liquid");
+    assert_eq!(range, "the saved state has another range for scalar 1 than the liquid");
     // Names are the host's.
     let mut named = basin(&ctx, [8, 8], &[Scalar::dye("ink"), age, warmth]);
     named.restore(&saved).unwrap();

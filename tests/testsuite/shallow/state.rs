@@ -242,7 +242,7 @@ fn a_state_of_something_else_is_refused_with_a_sentence() {
     let mut kinds = points();
     kinds.swap(1, 2);
     fewer.set_flows(&kinds, |at| format!("point {at}")).unwrap();
-    let expected = "the saved state has another kind of flow point 1 than the liquid";
+    let expected = "the saved state has flow point 1 of another kind than the liquid";
     assert_eq!(refusal(&mut fewer, &saved), expected);
 
     let mut newer = saved.clone();
