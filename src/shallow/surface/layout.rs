@@ -51,7 +51,7 @@ pub struct Layout {
     /// dry vertex is at least as far below its base, and further where the liquid around is lower.
     pub least_depth: f64,
     /// Depth (m) from which a wet vertex is at its full height. Below it, the thinner the liquid, the closer its vertex is to that of a dry
-    /// column, so that no vertex jumps as its column wets or dries. 0: at once; 0.02 of a cell works well.
+    /// column, so that no vertex jumps as its column wets or dries. 0: full height at any depth; 0.02 of a cell works well.
     pub fade_depth: f64,
     /// Depth from which the liquid is opaque (m), for [`Target::opacities`].
     pub opaque_depth: f64,
@@ -151,7 +151,7 @@ impl Target<'_> {
     }
 }
 
-/// Checks that a mesh fits its buffers; of each are given its name, its length (none if it is absent), and the length needed.
+/// Checks that a mesh fits its buffers; each is given as its name, its length (none if it is absent), and the length needed.
 pub(in crate::shallow) fn check_buffers<'a>(
     mesh_has: &str,
     counts: &Counts,
@@ -173,7 +173,7 @@ pub(in crate::shallow) fn check_buffers<'a>(
     let count = counts.vertices;
     ensure(
         count <= 1 << 16 || !matches!(indices, Indices::U16(_)),
-        format_args!("{count} vertices are too many for indices of 16 bits: take those of 32"),
+        format_args!("{count} vertices are too many for indices of 16 bits: use those of 32"),
     )?;
     Ok(())
 }

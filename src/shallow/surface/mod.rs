@@ -7,7 +7,7 @@
 //! |---|---|
 //! | height | eta, the level of a column's surface: its base plus its depth (units); for a dry column its base |
 //! | room | [min, max) of a column: from the underside of its solid to its ceiling; the rooms of a cell do not overlap |
-//! | linked | two columns of neighbouring cells (8), one of them wet, where each one's room holds the other's height |
+//! | linked | two columns, at least one of them wet, of which each one's room holds the other's height; their cells are neighbours (each has 8) |
 //! | quartet | the columns of 2 x 2 cells, named by the north-west cell (minimum x and z) |
 //! | group | four columns of a quartet in which every pair that includes a wet column is linked; or three such columns, if they are not part of a group of four |
 //! | full | a quartet is full on a layer if its four columns there are a group |
@@ -20,8 +20,8 @@
 //! along the wet one; otherwise along the one with the larger sum of heights, and if these are equal from north-west to south-east. The
 //! surface ends at the centres of the outermost cells.
 //!
-//! If of four columns only two in cells side by side are not linked, there are two groups of three, whose triangles overlap
-//! ([`Check::doubled`]): the liquid splits into two layers there.
+//! If in a quartet only two columns are not linked, and their cells are side by side, there are two groups of three, whose triangles
+//! overlap ([`Check::doubled`]): the liquid splits into two layers there.
 
 pub(super) mod buffers;
 pub mod counts;

@@ -9,7 +9,7 @@ use crate::shallow::columns::grid::BOTTOMLESS;
 pub(super) struct CellCrossings {
     /// Cell and crossing, in any order.
     crossings: Vec<[u32; 2]>,
-    /// For each cell, and one after the last: count of its crossings, then where they begin in `sorted`, then where they end.
+    /// For each cell: first the count of its crossings, then where they begin in `sorted`, and last where they end.
     ends: Vec<u32>,
     /// The crossings of each cell together.
     sorted: Vec<u32>,

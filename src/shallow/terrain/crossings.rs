@@ -8,30 +8,30 @@ use crate::shallow::columns::grid::{Heights, TOP};
 
 /// A triangle that lines may cross.
 pub struct Facet {
-    /// In the triangle's order, starting with the lowest one, or with the highest if the lowest height is not unique.
+    /// In the triangle's order, starting with the lowest corner, or with the highest if several are the lowest.
     pub corners: [Corner; 3],
     /// Minimum and maximum height (m).
     range: [f64; 2],
-    /// Up to this magnitude, rounding may change the sign of an area (m2, twice).
+    /// Up to this magnitude, rounding may change the sign of a doubled area (m2).
     doubt: f64,
-    /// In a triangle of at most this area (m2, twice), rounding may move a height by 2^-8 units.
+    /// In a triangle of at most this doubled area (m2), rounding may move a height by 2^-8 units.
     rough: f64,
 }
 
 /// How several lines lie relative to a triangle.
 #[derive(Default)]
 pub struct Crossed {
-    /// How far they are inside it, and outside it, measured as areas (m2, twice).
+    /// How far they are inside it, and outside it, measured as doubled areas (m2).
     inside: [f64; LANES],
     outside: [f64; LANES],
-    /// Its area (m2, twice), negative if it faces up.
+    /// Its doubled area (m2), negative if it faces up.
     area: [f64; LANES],
     /// Height (units), clamped to the range and rounded, for [`integer_of`].
     units: [f64; LANES],
 }
 
 impl Facet {
-    /// A triangle whose heights matter to within a small part of `unit` (m).
+    /// A triangle; heights on it are needed to within a small part of `unit` (m).
     #[inline(always)]
     pub fn new([a, b, c]: [Corner; 3], unit: f64) -> Self {
         let range = |axis: usize| [min(min(a[axis], b[axis]), c[axis]), max(max(a[axis], b[axis]), c[axis])];
@@ -187,13 +187,14 @@ fn along(a: &Corner, b: &Corner, at: [f64; 2]) -> f64 {
     low[1] + part * (high[1] - low[1])
 }
 
-/// (b - a) x (s - a), twice the signed area of (a, b, s) in (x, z): the sign is exact, the magnitude the nearest f64 to within about 2^-64
-/// of it, and both depend on the exact value alone.
+/// (b - a) x (s - a), twice the signed area of (a, b, s) in (x, z): the sign is exact; the magnitude is off by at most about 2^-64 of it
+/// before it is rounded to an f64. Both depend on the exact value alone.
 ///
-/// Exact because all of it is done in integers. Each f64 is m 2^k. Where the six coordinates are multiples of a power of two and below 2^62
-/// times it, i128 holds differences (63 bits), products (126) and their difference (127). Otherwise the six products of the expanded
-/// determinant are summed in 768 bits. Those hold multiples of 2^-320 below 2^448: a and b come from f32 without denormals (multiples of
-/// 2^-149 below 2^128), and s is the centre of a cell of 1e-9 m or more, a multiple of 2^-84, within some 2^100.
+/// The sign is exact because products that are not exact in f64 are computed in integers. Each f64 is m 2^k. Where the six coordinates are
+/// multiples of a power of two and below 2^62 times it, i128 holds differences (63 bits), products (126) and their difference (127).
+/// Otherwise the six products of the expanded determinant are summed in 768 bits, which hold multiples of 2^-320 below 2^448. That
+/// suffices: a and b come from f32 without denormals (multiples of 2^-149 below 2^128), and s is the centre of a cell of 1e-9 m or more, a
+/// multiple of 2^-84, within some 2^100.
 pub fn exact_cross(a: [f64; 2], b: [f64; 2], s: [f64; 2]) -> f64 {
     let products = [[a[0], s[0], b[1], s[1]], [a[1], s[1], b[0], s[0]]].map(exact_product);
     if let [Some(first), Some(second)] = products {

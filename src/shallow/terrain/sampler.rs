@@ -16,10 +16,10 @@ const MAX_STEPS: f64 = 1e15;
 
 /// The solids of every cell: where distances are negative. Each line is sampled from the minimum height up in steps of a voxel (m), and
 /// sign changes are located by linear interpolation; solids and gaps thinner than a voxel may be missed. What is solid at the minimum
-/// height is solid without end below it.
+/// height has no lower end.
 ///
-/// Below and above the heights `between` (m) distances keep their sign: only the ends of the lines are sampled there, so that a level set
-/// may lie in a height range of any length.
+/// Below and above the heights `between` (m) distances must not change their sign: only the ends of the lines are sampled there, so that a
+/// level set may lie in a height range of any length.
 ///
 /// `sample` gets positions (m), at most 16,384 at a time, and replaces the contents of its second argument by their distances (m).
 ///

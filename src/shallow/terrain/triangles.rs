@@ -23,7 +23,7 @@ use crate::numeric::cpu::{FlushDenormals, dispatch};
 use crate::numeric::lists::refill;
 use crate::shallow::columns::grid::{Cells, Grid, Heights, check_cells};
 
-/// Up to this many lines are tested against a triangle without limiting the rows to its edges.
+/// Up to this many lines are all tested against a triangle; of more, only those of each row between its edges.
 const FEW: u32 = 3;
 /// Count of lines that are collected before they are tested against a triangle.
 const ROOM: usize = 64;
@@ -56,7 +56,7 @@ pub struct Caster {
 }
 
 impl Caster {
-    /// A caster without a cast yet.
+    /// A caster that has not cast yet.
     ///
     /// # Errors
     /// `Argument`: a grid that [`Grid::validate`] refuses, an origin beyond 1e30 m from 0 (the range of exact decisions), cells that f64

@@ -1,11 +1,11 @@
 //! Level of detail: cells of the terrain's size near what matters, and of twice the size everywhere else.
 //!
 //! Two liquids share one lattice of heights: a *fine* one with ground only in a box of cells, the *near* part, and a *coarse* one with
-//! ground in all other cells (`ground.rs`). Outside its region each has no columns, and its edge is a wall. Along the edge of the box,
-//! separate pipes join the two (`seam.rs`). A coarse unit is four fine ones, so volumes are counted in fine units. A remainder of less than
-//! a coarse unit waits, with the scalars that it carries, and is part of the balance (`remainders.rs`). When the box moves, four fine
-//! columns become a coarse one, or the reverse (`shift.rs`), and fluxes persist (`momentum.rs`). Nothing is lost. `surface/` writes one
-//! mesh of both.
+//! ground in all other cells (`ground.rs`). Outside its region a liquid has no columns, and the edge of the region is a wall. Along the
+//! edge of the box, separate pipes join the two (`seam.rs`). A coarse unit is four fine ones, so volumes are counted in fine units. A
+//! remainder of less than a coarse unit waits, with the scalars that it carries, and is part of the balance (`remainders.rs`). When the box
+//! moves, four fine columns become a coarse one, or the reverse (`shift.rs`), and fluxes persist (`momentum.rs`). Nothing is lost.
+//! `surface/` writes one mesh of both.
 
 mod buffers;
 mod frame;

@@ -21,7 +21,7 @@ enum Pipe {
     Within(usize, Option<usize>),
     /// Along the edge of the near cells: its fine column, axis and direction.
     Seam(usize, usize, i32),
-    /// None.
+    /// No pipe.
     Closed,
 }
 

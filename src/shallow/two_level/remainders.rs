@@ -36,7 +36,7 @@ impl Contents {
         }
     }
 
-    /// The part of this that a count of units takes along.
+    /// The share of this that a count of its units has.
     pub fn part(&self, units: i64) -> Self {
         Self { units, amounts: part(&self.amounts, units, self.units) }
     }

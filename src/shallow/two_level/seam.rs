@@ -1,9 +1,9 @@
 //! The pipes between fine and coarse columns, along the edge of the near cells.
 //!
-//! Each leads from a fine cell across its side to the coarse one beyond: Eq. 4.1 and 4.5 over the distance between their middles, 1.5
-//! cells, through the cross-section of the fine cell. The coarse surface is evaluated beside the fine cell's middle, a quarter of a coarse
-//! cell to the side, with the slope given by the coarse columns along the edge: otherwise a film that runs along the edge would oscillate
-//! across it.
+//! Each leads from a fine cell across its side to the coarse one beyond. Eq. 4.1 and 4.5 are evaluated over the distance between their
+//! middles, 1.5 fine cells, with the cross-section of the fine cell. The coarse surface is evaluated beside the fine cell's middle, a
+//! quarter of a coarse cell to the side, with the slope given by the coarse columns along the edge: otherwise a film that runs along the
+//! edge would oscillate across it.
 
 use super::FINE_PER_COARSE;
 use super::remainders::{Contents, Remainders, add_to_column, of_column};
@@ -64,9 +64,9 @@ pub(in crate::shallow) struct Seam {
     amounts: [Vec<[i64; MAX_SCALARS]>; 2],
     /// Cell of each coarse column (`Grid::index`).
     cells: Vec<u32>,
-    /// Whether a column has a ceiling.
+    /// Whether any of these columns has a ceiling.
     has_ceilings: bool,
-    /// Whether a pipe has a transfer in this step.
+    /// Whether any pipe has a transfer in this step.
     is_moving: bool,
     /// Length of the step that fluxes refer to (s).
     pub last: f64,
@@ -192,8 +192,8 @@ impl Seam {
         self.pipes.get(pipe).filter(|pipe| key(pipe) == wanted).map(|_| pipe)
     }
 
-    /// Finds the fluxes of a step of `length` (s), from the surfaces before the step, as for all other pipes: with later ones waves would
-    /// grow.
+    /// Finds the fluxes of a step of `length` (s), from the surfaces before the step, as for all other pipes: with later surfaces, waves
+    /// would grow.
     pub fn begin_step(&mut self, fine: &Shallow, coarse: &Shallow, measures: &Measures, length: f64) {
         let step = time_step::step(&fine.params, measures, length, self.last);
         let step = Step { drive: step.drive / DISTANCE, ..step };
@@ -236,7 +236,7 @@ impl Seam {
                 (end != NONE as usize && coarse_depths[end] > 0)
                     .then(|| i64::from(coarse_bases[end] + coarse_depths[end]))
             };
-            // Eight times the rise over a quarter of a cell to the side.
+            // Eight times the rise over a quarter of a coarse cell to the side.
             let rise =
                 if depth[1] == 0 { 0 } else { rise(i64::from(eta), pipe.neighbours.map(beside)) as i32 };
             // The tilt of gravity is per cell.
@@ -357,7 +357,8 @@ fn add(gives: &mut [Vec<f64>; 2], takes: &mut [Vec<f64>; 2], positions: &[u32; 2
     }
 }
 
-/// The rise of a surface from the column before another one to the column after it; if only one of them is wet, twice the rise on its side.
+/// The rise of a surface from the column before a given one to the column after it; if only one of the two is wet, twice the rise on its
+/// side.
 pub(super) fn rise(own: i64, sides: [Option<i64>; 2]) -> i64 {
     match sides {
         [Some(before), Some(after)] => after - before,

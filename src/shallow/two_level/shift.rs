@@ -53,7 +53,7 @@ impl Detail {
         Ok(())
     }
 
-    /// Takes the held liquid of cells that now belong to the other liquid, or it would be lost where they have no ground any more.
+    /// Takes the held liquid of cells that now belong to the other liquid: it would be lost where these cells no longer have ground.
     fn take_held(&mut self, near: &Cells, out: &mut [Vec<Parcel>; 2]) {
         let Self { fine, coarse, .. } = self;
         let is_near = |[x, z]: [usize; 2]| near[0].contains(&x) && near[1].contains(&z);
@@ -169,7 +169,7 @@ fn fit_depths(depths: &mut [i64; 4], columns: &[Option<usize>; 4], units: i64) {
         if missing == 0 || count == 0 {
             return;
         }
-        // Less than one missing unit a column is not shared; an excess is taken equally from all.
+        // Only whole missing units per column are shared; an excess is taken equally from all.
         let each = missing.div_euclid(count);
         for (at, depth) in depths.iter_mut().enumerate() {
             if takes(at, *depth) {

@@ -230,12 +230,7 @@ fn what_does_not_fit_is_an_error_and_writes_nothing() {
     let mut indices = vec![7u16; bound(&columns).indices];
     let mut positions = vec![7.0; 300 * 300 * 3 - 1];
     let mut target = Target { indices: Indices::U16(&mut indices), ..Target::default() };
-    fails(
-        &good,
-        &layout,
-        &mut target,
-        "90000 vertices are too many for indices of 16 bits: take those of 32",
-    );
+    fails(&good, &layout, &mut target, "90000 vertices are too many for indices of 16 bits: use those of 32");
     assert!(indices.iter().all(|index| *index == 7));
     let mut target = Target { positions: Some(&mut positions), ..Target::default() };
     fails(&good, &layout, &mut target, "positions has room for 269999 numbers, and the surface has 270000");

@@ -75,13 +75,14 @@ impl Quartet {
     /// Maximum number of triangles, from the columns at each corner and the bit of this quartet in their `walls`. Columns of different sets
     /// share no triangle: the maxima of the sets are summed.
     ///
-    /// A set with at most one column at each corner has at most two triangles, or one if it has three corners: where all links exist, the
-    /// columns are a group of four, else two of its groups of three lack one. If its surface may end at walls, and each of its columns may
-    /// be linked with every other, then the higher of two surfaces is linked with the other or ends above it. The highest wet column A,
-    /// alone at its corner, is then in at most two triangles, as each column has one entry at a corner where it is linked or ends.
-    /// Triangles without A lie at the three other corners and contain the next lower wet column B. It may be linked there with both a
-    /// column and A's wall at either corner, but not at both, or A is in a group with them: three triangles. Or B is not linked with A, and
-    /// the third, C, may be: two triangles. There is one fewer where the set lacks a corner, as only walls are there.
+    /// A set with at most one column at each corner has at most two triangles, or one if it has three corners: if all links exist, its
+    /// columns are a group of four; if one is missing, two of the four possible groups of three would need it. If its surface may end at
+    /// walls, and each of its columns may be linked with every other, then the higher of two surfaces is linked with the other or ends
+    /// above it. The highest wet column A, alone at its corner, is then in at most two triangles, as each column has one entry at a corner
+    /// where it is linked or ends. Triangles without A lie at the three other corners and contain the next lower wet column B. It may be
+    /// linked there with both a column and A's wall at either corner, but not at both, or else A would be in a group with them: three
+    /// triangles. Or B is not linked with A, and the third, C, may be: two triangles. There is one fewer where the set lacks a corner, as
+    /// only walls are there.
     ///
     /// In other sets without walls, a wet column is in one group of four or two of three. A group has a wet column, and others only where
     /// they are dry, which at most three groups can share: one triangle per column. Groups without a common wet column are at different

@@ -8,13 +8,13 @@
 //!
 //! where c_k are the barycentric coordinates of the vertex in a triangle of three columns, and w_k = dx / max(h_v - b_k, 1e-10 dx)
 //! (Eq. 4.38). A quartet may be divided along either diagonal, so the triangles of both are constraints; a column takes the maximum over all
-//! vertices. The thesis constrains the bilinear patch, which is neither, by an equation that would also lower surfaces.
+//! vertices. The thesis constrains the bilinear patch, which is not what is drawn, by an equation that would also lower surfaces.
 //!
 //! Lagrange multipliers give l_k = m c_k / w_k. Columns below the global minimum are set to it, and the others make up the rest.
 //!
 //! Where the weights give a minimum height of over dx, as a vertex close to a column at the top of a slope does for the columns at its
-//! foot, equal weights are tried, and used if their maximum is smaller. A vertex that still needs a height of more than dx above the
-//! highest base is discarded (thesis 4.2.4).
+//! foot, equal weights are tried, and used if the largest minimum height that they give is smaller. A vertex that still needs a height of
+//! more than dx above the highest base is discarded (thesis 4.2.4).
 //!
 //! A film links three columns if each one's room holds the bases of the others; a vertex belongs to the columns whose rooms hold it.
 
@@ -33,12 +33,12 @@ const MIN_RISE: f64 = 1e-10;
 /// Distances between a thin film and the terrain's mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distance {
-    /// Global minimum: how far a wet vertex is above its base (cells).
+    /// Global minimum: how far a wet vertex is at least above its base (cells).
     pub least: f64,
-    /// How far the surface is above the terrain's vertices (cells).
+    /// How far the surface is at least above the terrain's vertices (cells).
     pub margin: f64,
-    /// How far its rim is below them, and at least below the bases of dry columns (cells); more than the margin, as the terrain may be
-    /// lower between its vertices.
+    /// How far the surface's rim is at least below the terrain's vertices and below the bases of dry columns (cells); more than the margin,
+    /// as the terrain may be lower between its vertices.
     pub rim: f64,
 }
 
@@ -147,7 +147,7 @@ impl MinimumHeights {
     }
 
     /// Recomputes the minimum heights near a box of cells (ranges of x and of z); the result is as if all were recomputed. Changed columns,
-    /// and the old and new positions of changed triangles, must lie in the box; other columns may have other indices.
+    /// and the old and new positions of changed triangles, must lie in the box; the indices of other columns may have changed.
     ///
     /// # Errors
     /// As [`MinimumHeights::find`]; also a box that is not within the grid.
@@ -429,8 +429,8 @@ impl FilmTriangle {
         a + (b + c)
     }
 
-    /// Numbers whose mean at the vertex is `need`, none of them below `min` (itself below `need`), with the minimum sum of their
-    /// squares / `ease`.
+    /// Numbers whose mean at the vertex is `need`, none of them below `min` (itself below `need`), with the minimum sum of their squares
+    /// divided by `ease`.
     fn least_squares(&self, need: f64, min: f64, ease: [f64; 3]) -> [f64; 3] {
         let mut out = [min; 3];
         let mut is_free = self.barycentric.map(|part| part > 0.0);

@@ -154,7 +154,8 @@ impl Corners {
     }
 }
 
-/// Each position of a strip gets the value of the position to the east; the last one that of the strip to the east.
+/// Each position of a strip gets the value of the position to the east; the last one gets that of the first position of the strip to the
+/// east.
 #[inline(always)]
 fn from_east(own: u16, east: u16) -> u16 {
     own >> 1 | east << 15

@@ -14,8 +14,8 @@ pub(in crate::shallow::surface) struct Search {
     /// Triangles of the quartet that was searched last.
     triangles: Vec<[u32; 3]>,
     walled_quartet: WalledQuartet,
-    /// Triangles of all odd quartets without walls (0) and with walls (1), and how many each quartet has; quartets without any are left
-    /// out.
+    /// Triangles of all odd quartets without walls (0) and with walls (1), and how many each quartet has; quartets with neither walls nor
+    /// triangles are left out.
     found: [Vec<[u32; 3]>; 2],
     counts: [Vec<u32>; 2],
 }

@@ -18,7 +18,8 @@ use crate::shallow::surface::{Indices, Target};
 pub(in crate::shallow::surface) struct Skirts {
     /// Edges of odd quartets and of full ones beside them, between wet columns, in the direction of their triangles.
     edges: Vec<[u32; 2]>,
-    /// For each column, the directions of such edges that start at it: a bit per position in the ring of cells around. 0 between surfaces.
+    /// For each column, the directions of such edges that start at it: a bit per position in the ring of cells around. All are 0 between
+    /// calls.
     directions: Vec<u8>,
     /// Edges with a triangle on one side only, which get a skirt.
     open: Vec<[u32; 2]>,
@@ -26,7 +27,7 @@ pub(in crate::shallow::surface) struct Skirts {
     pub(super) skirt_vertices: Vec<SkirtVertex>,
     /// Number of the first skirt vertex in the mesh.
     first: u32,
-    /// For each column, the position of its skirt vertex, or [`NONE`]. All [`NONE`] between surfaces.
+    /// For each column, the position of its skirt vertex, or [`NONE`].
     positions: Vec<u32>,
 }
 
