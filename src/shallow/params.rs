@@ -94,7 +94,7 @@ impl Params {
         let [x, y, z] = self.gravity;
         ensure(
             x.is_finite() && z.is_finite() && (-1e3..=-1e-3).contains(&y),
-            format_args!("gravity = ({x}, {y}, {z}) m/s2 does not point down, by 0.001 to 1000"),
+            format_args!("gravity = ({x}, {y}, {z}) m/s2 does not point down by 0.001 to 1000"),
         )?;
         ensure(
             x.abs().max(z.abs()) <= -y,
