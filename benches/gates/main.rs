@@ -46,6 +46,7 @@ fn main() {
     h.measure("snow.mist.frame_rate", snow::mist::frame_rate::measure);
     h.measure("snow.mist.turbulence_decorrelates", snow::mist::eddies::measure);
     snow::mist::walls::run(&mut h);
+    snow::mist::jets::run(&mut h);
     snow::mist::passes::run(&mut h);
     h.measure("snow.mist.cancel_p99", snow::mist::cancel::measure);
     snow::shot::run(&mut h);

@@ -61,6 +61,8 @@ pub struct Flow {
     around: Option<Box<Flow>>,
     /// The operator of the last projection and its preconditioner.
     multigrid: Multigrid,
+    /// The solids of the last projection, until the velocity is advected.
+    solids: Option<Solids>,
     scratch_fields: Scratch,
 }
 
@@ -130,6 +132,7 @@ impl Flow {
         if &self.tiles.coords()[..self.tiles.active()] == active {
             return;
         }
+        self.solids = None;
         let old = std::mem::replace(&mut self.tiles, Tiles::new(active));
         let Self { tiles, velocity, density, pressure, scratch_fields, .. } = self;
         let find = |coord: &Coord| old.find(*coord).unwrap_or(tiles::NONE);
@@ -188,10 +191,22 @@ impl Flow {
         let fields = scratch_fields.six(tiles);
         let solved =
             pressure::project(ctx, (tiles, &solids), velocity, pressure, multigrid, fields, tolerance)?;
+        self.solids = Some(solids);
+        Ok(solved)
+    }
+
+    /// Sets the velocity in and near the solids of the last projection, and in the rim, to what advection reads. [`Flow::advect`] does so
+    /// itself; called before, the largest speed is that of the air that will move.
+    pub fn prepare_advection(&mut self) {
+        let Some(solids) = self.solids.take() else { return };
+        if let Some(around) = &mut self.around {
+            around.prepare_advection();
+        }
+        slip::slow_gaps(&solids, &mut self.velocity);
+        slip::extend(&self.tiles, &self.multigrid.finest, &solids, &mut self.velocity);
         let tiles = std::mem::take(&mut self.tiles);
         self.set_outer_velocity(&tiles, &tiles);
         self.tiles = tiles;
-        Ok(solved)
     }
 
     /// Reads its velocity at lower faces on an axis for finer tiles.

@@ -42,6 +42,7 @@ mod flow {
     mod advection;
     mod fields;
     mod pressure;
+    mod walls;
 }
 mod house {
     mod circles;

@@ -29,6 +29,7 @@ impl Flow {
     /// # Errors
     /// Cancel; the fields are then invalid.
     pub fn advect(&mut self, ctx: &Context, dt: f64, scheme: Scheme) -> Result<()> {
+        self.prepare_advection();
         self.carry(ctx, dt, scheme, None)
     }
 
@@ -45,6 +46,7 @@ impl Flow {
         dt: f64,
         conservation: MassConservation,
     ) -> Result<()> {
+        self.prepare_advection();
         self.carry(ctx, dt, Scheme::Bounded, Some(conservation))
     }
 
@@ -57,7 +59,7 @@ impl Flow {
     ) -> Result<()> {
         if let Some(around) = &mut self.around {
             std::mem::swap(&mut around.scratch_fields, &mut self.scratch_fields);
-            let done = around.advect(ctx, dt, scheme);
+            let done = around.carry(ctx, dt, scheme, None);
             std::mem::swap(&mut around.scratch_fields, &mut self.scratch_fields);
             done?;
         }

@@ -11,7 +11,6 @@ mod transfer;
 
 use rayon::prelude::*;
 
-use super::slip;
 use super::solids::Solids;
 use super::tiles::{FACES, Field, Tile, Tiles, ZEROS};
 use super::window::max;
@@ -85,7 +84,6 @@ pub fn project(
         solved.iterations += 1;
     }
     subtract_gradient(tiles, solids, pressure, velocity);
-    slip::extend(tiles, &multigrid.finest, solids, velocity);
     Ok(solved)
 }
 

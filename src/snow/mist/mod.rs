@@ -282,6 +282,7 @@ impl Mist {
 
     /// Advects the air and the mist for `dt` (s); some of the mist dissipates.
     fn advect(&mut self, ctx: &Context, dt: f64) -> Result<()> {
+        self.flow.prepare_advection();
         // The boundary may have made the air faster than it was when the sub-steps were chosen.
         let parts = self.parts(f64::from(self.bulk_speed()), dt)?;
         let part = dt / parts as f64;

@@ -3,6 +3,7 @@
 pub mod cancel;
 pub mod eddies;
 pub mod frame_rate;
+pub mod jets;
 pub mod passes;
 pub mod walls;
 
