@@ -147,7 +147,7 @@ impl Conversion<'_> {
         let mut data = match extension(path).as_str() {
             "vdb" => {
                 let points = points_of_vdb(path)?;
-                if self.space == Space::OWN {
+                if self.space == Space::OWN && self.voxel.is_none() {
                     // These are kept bit by bit, unlike points that are regrouped into voxels.
                     return Ok(LoadedPoints { points, has_voxels: true });
                 }

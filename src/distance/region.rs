@@ -40,7 +40,7 @@ impl Region {
         let blocks = region.size().iter().map(|&size| size as u64).product::<u64>();
         if blocks > MAX_BLOCKS {
             let what = "the region that the objects sweep (make the cell larger or the motion shorter)";
-            return Err(Error::Memory { what: what.into(), needed: blocks * 8, limit: MAX_BLOCKS * 8 });
+            return Err(Error::Memory { what: what.into(), needed: blocks * 4, limit: MAX_BLOCKS * 4 });
         }
         Ok(region)
     }

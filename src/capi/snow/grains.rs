@@ -125,7 +125,8 @@ impl GrainsHandle {
         let bodies = unsafe { bodies(ctx, list, count, dt, Role::Push, &mut self.shapes) }?;
         if dt == 0.0 {
             let (count, resting) = (self.grains.count() as u64, self.grains.resting() as u64);
-            return Ok(frz_grains_report { count, resting, ..frz_grains_report::zeroed() });
+            let (trapped, owed) = (self.grains.trapped().len() as u64, self.grains.owed());
+            return Ok(frz_grains_report { count, resting, trapped, owed, ..frz_grains_report::zeroed() });
         }
         let objects: Vec<_> = bodies.iter().map(|(body, surface)| surface.object(body)).collect();
         let Ground { floor, lowest } = self.ground;

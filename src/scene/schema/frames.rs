@@ -126,7 +126,7 @@ impl FromStr for FrameChoice {
             }
             frames.extend(range.iter().step_by(step));
             if frames.len() as i64 > 2 * MAX_FRAMES {
-                return Err(format!("\"{text}\" asks for more than {MAX_FRAMES} frames"));
+                return Err(format!("\"{text}\" lists more than {} frames", 2 * MAX_FRAMES));
             }
         }
         frames.sort_unstable();

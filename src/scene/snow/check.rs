@@ -63,7 +63,8 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs, folder: Option<&Path
     }
     warnings.extend(inputs.far_static(scene));
     if objects.is_empty() {
-        warnings.push("nothing moves through the snow: no object has the role collide".into());
+        warnings
+            .push("nothing moves through the snow: no object has the role collide, base or grains".into());
     }
     let grains = match folder.filter(|_| has_grains(&scene.values)) {
         Some(folder) => {

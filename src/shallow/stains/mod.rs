@@ -223,7 +223,7 @@ impl Stains {
     /// # Errors
     /// As [`Stains::stains`].
     pub fn soaked(&self, out: &mut [f32]) -> Result<()> {
-        check_room(out.len(), "stains", self.len(), "vertices")?;
+        check_room(out.len(), "soaked", self.len(), "vertices")?;
         out.iter_mut().zip(self.each_soaked()).for_each(|(out, soaked)| *out = soaked);
         Ok(())
     }

@@ -283,8 +283,7 @@ impl Grains {
                 let left = self.enforce_limits(around.lowest, to - from, frame);
                 Ok((left, self.heap.resting(), self.heap.fastest()))
             })?;
-            // An empty sum is -0.
-            let (count, owed) = (self.heap.count(), self.owed.values().sum::<f64>() + 0.0);
+            let (count, owed) = (self.heap.count(), self.owed());
             let (dropped, phases) = (all - count - expired, Vec::new());
             Ok(StepReport {
                 count,
@@ -420,6 +419,12 @@ impl Grains {
     /// the base.
     pub fn trapped(&self) -> &[u32] {
         self.heap.trapped()
+    }
+
+    /// Grains that removed snow has paid for but that do not exist yet: a sum with fractions.
+    pub fn owed(&self) -> f64 {
+        // An empty sum is -0.
+        self.owed.values().sum::<f64>() + 0.0
     }
 
     fn births(&self) -> impl Iterator<Item = &Birth> + '_ {
