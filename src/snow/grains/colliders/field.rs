@@ -159,9 +159,7 @@ impl Patch {
     fn of(window: &Window<'_>, low: [i32; 3], end: [i32; 3]) -> Self {
         let size = [0, 1, 2].map(|axis| (end[axis] - low[axis]) as usize);
         let mut values = Vec::with_capacity(size.iter().product());
-        for (x, y) in (low[0]..end[0]).flat_map(|x| (low[1]..end[1]).map(move |y| (x, y))) {
-            values.extend((low[2]..end[2]).map(|z| window.value([x, y, z])));
-        }
+        window.copy(low, end, &mut values);
         let min = values.iter().copied().fold(f32::INFINITY, f32::min);
         Self { low, size, values, min }
     }
@@ -222,13 +220,34 @@ impl<'a> Window<'a> {
         self.probes.iter().any(may)
     }
 
-    fn value(&self, voxel: [i32; 3]) -> f32 {
+    /// The block that holds a voxel, or the nearest one in the window, and the voxel's offset in its block.
+    fn find(&self, voxel: [i32; 3]) -> (&Probe<'a>, usize) {
         let leaf = [0, 1, 2]
             .map(|axis| ((voxel[axis] >> 3) - self.low[axis]).clamp(0, self.size[axis] as i32 - 1) as usize);
         let [x, y, z] = voxel.map(|at| (at & 7) as usize);
-        match &self.probes[(leaf[0] * self.size[1] + leaf[1]) * self.size[2] + leaf[2]] {
-            Probe::Leaf(leaf) => leaf.values[offset(x, y, z)],
-            Probe::Tile { value, .. } => *value,
+        (&self.probes[(leaf[0] * self.size[1] + leaf[1]) * self.size[2] + leaf[2]], offset(x, y, z))
+    }
+
+    fn value(&self, voxel: [i32; 3]) -> f32 {
+        match self.find(voxel) {
+            (Probe::Leaf(leaf), offset) => leaf.values[offset],
+            (Probe::Tile { value, .. }, _) => *value,
+        }
+    }
+
+    /// Appends the values of the voxels from `low` up to `end`, exclusive; z varies fastest.
+    pub fn copy(&self, low: [i32; 3], end: [i32; 3], out: &mut Vec<f32>) {
+        for (x, y) in (low[0]..end[0]).flat_map(|x| (low[1]..end[1]).map(move |y| (x, y))) {
+            let mut z = low[2];
+            while z < end[2] {
+                let next = ((z | 7) + 1).min(end[2]);
+                let count = (next - z) as usize;
+                match self.find([x, y, z]) {
+                    (Probe::Leaf(leaf), offset) => out.extend_from_slice(&leaf.values[offset..][..count]),
+                    (Probe::Tile { value, .. }, _) => out.extend(std::iter::repeat_n(*value, count)),
+                }
+                z = next;
+            }
         }
     }
 

@@ -1,5 +1,7 @@
 //! Corners of cells, and level sets sampled at them.
 
+use std::borrow::Cow;
+
 use crate::context::Context;
 use crate::error::Result;
 use crate::flow::Coord;
@@ -117,11 +119,71 @@ impl<'a> Grid<'a> {
         })
     }
 
-    /// Signed distance (m) at a corner of a tile, where `at` is the corner's index; none if far away.
-    pub fn at(&self, slot: usize, at: usize, corner: DVec3) -> Option<f32> {
+    /// Signed distances (m) at the corners of a tile, in the order of [`Lattice::positions`]; none if the level set is far away.
+    pub fn corners(&self, slot: usize, tile: Coord, lattice: &Lattice) -> Option<Cow<'_, [f32]>> {
         Some(match self.near[slot].as_ref()? {
-            Distances::Leaves(window) => window.sample((corner * self.scale).into()).0,
-            Distances::Corners(values) => values[at],
+            // Level sets are sampled in their own cells: using the corners' indices keeps exact values exact.
+            Distances::Leaves(window) => Cow::Owned(interpolated(
+                window,
+                &tile.map(|at| {
+                    let first = at * 8 * lattice.parts as i32;
+                    (first..).take(lattice.corners()).map(|index| f64::from(index) * self.scale).collect()
+                }),
+            )),
+            Distances::Corners(values) => Cow::Borrowed(values),
         })
+    }
+}
+
+/// Trilinear interpolation at the points of a lattice, given by their coordinates (voxels, ascending) on each axis; one axis after the
+/// other, so that points share most of the work.
+fn interpolated(window: &Window<'_>, points: &[Vec<f64>; 3]) -> Vec<f32> {
+    let low = points.each_ref().map(|points| points[0].floor() as i32);
+    let end = points.each_ref().map(|points| points[points.len() - 1].floor() as i32 + 2);
+    let mut size = [0, 1, 2].map(|axis| (end[axis] - low[axis]) as usize);
+    let mut values = Vec::with_capacity(size.iter().product());
+    window.copy(low, end, &mut values);
+    for axis in [2, 1, 0] {
+        let (rows, width) =
+            (size[..axis].iter().product::<usize>(), size[axis + 1..].iter().product::<usize>());
+        let mut out = Vec::with_capacity(rows * points[axis].len() * width);
+        for row in values.chunks_exact(size[axis] * width) {
+            for at in &points[axis] {
+                let voxel = at.floor();
+                let weight = (at - voxel) as f32;
+                let two = &row[(voxel as i32 - low[axis]) as usize * width..][..2 * width];
+                let (lower, upper) = two.split_at(width);
+                out.extend(lower.iter().zip(upper).map(|(a, b)| a + (b - a) * weight));
+            }
+        }
+        size[axis] = points[axis].len();
+        values = out;
+    }
+    values
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::Pool;
+    use crate::vdb::level_set::from_particles;
+
+    #[test]
+    fn corners_are_sampled_as_single_positions_are() {
+        let ctx = Context::new(Pool::new(1).unwrap());
+        let ball = from_particles(&ctx, &[DVec3::new(0.01, -0.02, 0.03)], &[0.3], 0.05, 3.0).unwrap();
+        for (cell, parts) in [(0.05, 1), (0.1, 1), (0.07, 1), (0.11, 2), (0.02, 1)] {
+            let lattice = Lattice { cell, parts };
+            for tile in [[0, 0, 0], [-1, 0, 0], [-1, -1, -1], [0, -1, 0]] {
+                let grid = Grid::new(&ctx, Some(&ball), &[tile], &lattice).unwrap().unwrap();
+                let Some(Distances::Leaves(window)) = &grid.near[0] else { panic!("a tile without leaves") };
+                let values = grid.corners(0, tile, &lattice).unwrap();
+                assert_eq!(values.len(), lattice.corners().pow(3));
+                for (corner, value) in lattice.positions(tile).zip(values.iter()) {
+                    let alone = window.sample((corner / lattice.spacing() * grid.scale).into()).0;
+                    assert!((alone - value).abs() < 1.0e-6, "{cell} {tile:?} {corner:?}: {alone} {value}");
+                }
+            }
+        }
     }
 }

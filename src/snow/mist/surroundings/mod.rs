@@ -8,6 +8,7 @@ mod corners;
 #[cfg(feature = "vdb")]
 mod open_faces;
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
@@ -415,23 +416,22 @@ impl SampledWalls<'_> {
         let far = (NEAR * self.lattice.cell) as f32;
         let half = SHEET_HALF * self.lattice.cell;
         let mut distances = [Vec::with_capacity(count.pow(3)), Vec::with_capacity(count.pow(3))];
+        let grids = [&self.still[0], &self.still[1], &self.opened, &self.moving];
+        let [base, fixed, opened, moving] =
+            grids.map(|grid| grid.as_ref()?.corners(index, tile, &self.lattice));
         for corner in 0..count.pow(3) {
-            let at = [corner / (count * count), corner / count % count, corner % count];
-            let position = self.lattice.position(tile, at);
-            // Level sets are sampled in their own cells: using the corner's index keeps exact values exact.
-            let number = DVec3::from(
-                [0, 1, 2].map(|axis| f64::from(tile[axis] * 8 * self.lattice.parts as i32 + at[axis] as i32)),
-            );
-            let of = |grid: &Grid<'_>| grid.at(index, corner, number);
-            let floor = self.floor.map(|floor| (position.y - floor) as f32);
-            let [base, fixed] = self.still.each_ref().map(|grid| grid.as_ref().and_then(of));
-            let open = self.opened.as_ref().and_then(of).map_or(f32::NEG_INFINITY, |swept| -swept);
-            let base = base.map(|base| base.max(open));
-            let still = [base, fixed, floor].into_iter().flatten();
-            let moving = self.moving.iter().filter_map(of);
-            let solids = [still.fold(far, f32::min), moving.fold(far, f32::min)];
+            let of = |values: &Option<Cow<'_, [f32]>>| values.as_ref().map(|values| values[corner]);
+            let position = || {
+                let at = [corner / (count * count), corner / count % count, corner % count];
+                self.lattice.position(tile, at)
+            };
+            let floor = self.floor.map(|floor| (position().y - floor) as f32);
+            let open = of(&opened).map_or(f32::NEG_INFINITY, |swept| -swept);
+            let base = of(&base).map(|base| base.max(open));
+            let still = [base, of(&fixed), floor].into_iter().flatten();
+            let solids = [still.fold(far, f32::min), of(&moving).map_or(far, |moving| far.min(moving))];
             for side in 0..2 {
-                let near = sheets[side].iter().filter_map(|sheet| sheet.shell.nearest(position, half));
+                let near = sheets[side].iter().filter_map(|sheet| sheet.shell.nearest(position(), half));
                 let nearest = near.map(|near| (near.square.sqrt() - half) as f32);
                 distances[side].push(nearest.fold(solids[side], f32::min));
             }
