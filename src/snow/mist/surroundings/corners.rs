@@ -67,8 +67,11 @@ enum Distances<'a> {
     Corners(Vec<f32>),
 }
 
-/// Maximum width of a tile (cells of a level set) whose leaves are searched; wider tiles have too many.
-const MAX_WIDTH: f64 = 24.0;
+/// Maximum spacing of corners (cells of a level set) at which the leaves around a tile are copied; with wider spacing most of their values
+/// would not be used.
+const MAX_SCALE: f64 = 3.0;
+/// Maximum width (cells of a level set) of such a tile; wider tiles have too many leaves.
+const MAX_WIDTH: f64 = 48.0;
 
 impl<'a> Grid<'a> {
     pub fn new(
@@ -94,7 +97,7 @@ impl<'a> Grid<'a> {
             })
         };
         let bounds: Vec<Option<[[i32; 3]; 2]>> = bounds.map(|bounds| Some(bounds).filter(is_near)).collect();
-        let mut all = if edge > MAX_WIDTH {
+        let mut all = if scale > MAX_SCALE || edge > MAX_WIDTH {
             let near = tiles.iter().zip(&bounds).filter(|(_, bounds)| bounds.is_some());
             let positions: Vec<DVec3> = near.flat_map(|(tile, _)| lattice.positions(*tile)).collect();
             let mut values = Vec::new();

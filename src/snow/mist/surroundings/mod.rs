@@ -169,7 +169,7 @@ impl Walls<'_> {
         if tiles.count() == 0 {
             return Ok(Solids::none(tiles));
         }
-        let lattice = Lattice { cell, parts: self.parts() };
+        let lattice = Lattice { cell, parts: if cell > 1.5 * self.cell { 1 } else { self.parts() } };
         let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
         let Cache { fixed, moving, opened, faces: known } = &mut *cache;
         let key = |tile: &Coord| (cell.to_bits(), *tile);
@@ -225,8 +225,8 @@ impl Walls<'_> {
         near.map(|body| body.speed).fold(0.0, f64::max)
     }
 
-    /// Number of parts into which the edge of a cell is divided, so that corners of the finest cells lie in the base's narrow band; at most
-    /// [`MAX_PARTS`]. Wider cells are for air far away.
+    /// Number of parts into which the edge of the finest cells is divided, so that corners lie in the base's narrow band; at most
+    /// [`MAX_PARTS`]. Wider cells are for air far away, and are not divided.
     fn parts(&self) -> usize {
         let max_spacing = self.around.base.map_or(f64::INFINITY, |base| MAX_SPACING * base.voxel_size());
         (1..MAX_PARTS).find(|parts| self.cell / *parts as f64 <= max_spacing).unwrap_or(MAX_PARTS)
