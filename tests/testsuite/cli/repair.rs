@@ -267,7 +267,7 @@ fn what_cannot_be_repaired_is_a_sentence() {
         ("cube.obj -o none/out.ply", &["none/out.ply"]),
         ("cube.obj -o out.ply --cell 0", &["--cell"]),
         ("cube.obj -o out.ply --cell 0.00001 --max-memory 1G", &["cells of 0.00001 m", "needs about"]),
-        ("cube.obj -o out.ply --frames 1-2", &["--frames", "one mesh"]),
+        ("cube.obj -o out.ply --frames 1-2", &["--frames", "single mesh"]),
         ("body.%d.obj -o out.ply", &["body.%d.obj", "--frames A-B"]),
         ("body.%d.obj -o out.ply --frames 1-2", &["out.ply", "pattern"]),
         ("body.%d.obj -o out.%d.ply --frames 1-3", &["body.3.obj"]),

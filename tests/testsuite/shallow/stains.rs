@@ -244,7 +244,7 @@ fn wrong_numbers_are_a_sentence() {
     let plain = Staining::default();
     for (staining, what) in [
         (Staining { film: f64::NAN, ..plain }, "film = NaN is negative or not finite"),
-        (Staining { takes: -1.0, ..plain }, "takes = -1 is not finite"),
+        (Staining { takes: -1.0, ..plain }, "takes = -1 is negative"),
         (Staining { half_life: 0.0, ..plain }, "half_life = 0 s is not 0.001 or more"),
         (Staining { half_life: f64::NAN, ..plain }, "half_life = NaN s"),
         (Staining { scalar: Some(1), ..plain }, "no scalar 1 among 1"),
