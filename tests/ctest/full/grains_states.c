@@ -226,7 +226,7 @@ static void what_is_refused(frz_context *ctx, const ball *rest, const frz_grid *
     FAILS(frz_grains_step(ctx, grains, NULL, NULL, 1, DT, 1, &report), FRZ_ERROR_ARGUMENT, "bodies is NULL");
     FAILS(frz_grains_step(ctx, grains, NULL, NULL, 0, -1, 1, &report), FRZ_ERROR_ARGUMENT, "dt = -1 is not within 0 to 3600 s");
     FAILS(frz_grains_step(ctx, grains, NULL, NULL, 0, 1e300, 1, &report), FRZ_ERROR_ARGUMENT, "dt = ");
-    FAILS(frz_grains_step(ctx, grains, NULL, NULL, 0, 1e-300, 1, &report), FRZ_ERROR_ARGUMENT, "and less than 0.000001 s");
+    FAILS(frz_grains_step(ctx, grains, NULL, NULL, 0, 1e-300, 1, &report), FRZ_ERROR_ARGUMENT, "nor at least 0.000001 s");
     FAILS(frz_grains_step(ctx, grains, NULL, NULL, 0, (double)NAN, 1, &report), FRZ_ERROR_ARGUMENT, "dt is not finite");
     report.struct_size = 12;
     FAILS(frz_grains_step(ctx, grains, NULL, NULL, 0, DT, 1, &report), FRZ_ERROR_VERSION, "struct_size = 12");
