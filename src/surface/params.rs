@@ -26,7 +26,8 @@ pub struct Params {
     pub every: bool,
     /// If the mesh is rebuilt: minimum count of particles in a part of the mesh, 0..=1,000,000. Parts with fewer are removed, and drops
     /// with fewer get no mesh; with 0 and 1 only parts without any particle inside are removed. If at least one particle lies inside a
-    /// part, those outside within half a spacing of it count too. A mesh of one part stays.
+    /// part, those outside within half a spacing of it count too. If the mesh has only one part, this rule does not
+    /// remove it.
     pub min_drop: usize,
 }
 

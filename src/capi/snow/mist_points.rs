@@ -8,8 +8,8 @@ use crate::capi::level_set::body::frz_body;
 use crate::capi::runtime::context::{frz_context, steps};
 use crate::snow::mist::{Source, Start};
 
-/// Moves mist through a step, and adds what points raise along their paths: as frz_mist_step, for a host that has grains or a base layer of
-/// its own, or only their files.
+/// Moves mist through a step, and adds what points raise along their paths. Like frz_mist_step, but for a host that has its own grains or
+/// base layer, or only files of them.
 ///
 /// Each point is assumed to have moved at its final velocity for all of dt, even if it was hit or born during the step: where points begin
 /// to fly this raises too much mist, and more with longer steps. A host that knows where points were should call frz_mist_step_paths.
@@ -17,8 +17,8 @@ use crate::snow::mist::{Source, Start};
 /// positions: double[3] for each point at the step's end (m), finite, within 1e7 cells of the origin along each axis.
 /// velocities: float[3] for each point (m/s), finite.
 /// radius: of the points (m), above 0 and at most 64 cells.
-/// snow: the snow around which the air flows, as it was before the layer's step, in which bodies press into it: a level set with voxels
-///     fixed in world space. NULL: there is none.
+/// snow: the snow around which the air flows, as it was before bodies pressed into it in this step: a level set whose grid is neither
+///     rotated nor shifted relative to the world's axes. NULL: there is none.
 /// wind: as for frz_mist_step.
 /// bodies: as for frz_mist_step.
 /// count: as for frz_mist_step.
@@ -50,7 +50,7 @@ pub unsafe extern "C" fn frz_mist_step_points(
 }
 
 /// Moves mist through a step, and adds what points raise along their paths: as frz_mist_step_points, for a host that knows where points
-/// were before the step. The mist is that of frz_mist_step, bit for bit.
+/// were before the step. For the same points and snow, the mist is the same as that of frz_mist_step, bit for bit.
 ///
 /// positions_before: double[3] for each point at the step's beginning (m), as positions; for a point born in the step its position at
 ///     birth.

@@ -116,7 +116,7 @@ impl Args {
         }
     }
 
-    /// The motion with its first and last time; here frames, and the whole of a move or change, count as seconds.
+    /// The motion with its first and last time. A frame of a sequence counts as one second, and a whole move or change lasts one second.
     fn motion(&self) -> Result<(Box<dyn Motion>, f64, f64), Failure> {
         let (motion, from, to) = match &self.mesh[..] {
             [from, to] => {

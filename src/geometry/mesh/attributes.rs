@@ -1,4 +1,5 @@
-//! Arrays of numbers that a mesh carries besides its positions and texture coordinates: colours, masks and others of its file.
+//! Arrays of numbers that a mesh carries besides its positions and texture coordinates: colours, masks and whatever else its file
+//! holds.
 
 use super::used;
 use crate::geometry::{TriMesh, Uvs};
@@ -120,7 +121,7 @@ impl DetailedMesh {
         Self { mesh: self.mesh.without_unused(), uvs, arrays }
     }
 
-    /// The numbers of the vertices in the array of this name; for a vector with the components NAMEx, NAMEy and NAMEz, the lengths.
+    /// The per-vertex values of the array with this name; for a vector with the components NAMEx, NAMEy and NAMEz, its lengths.
     pub fn of_vertices(&self, name: &str) -> Option<Vec<f64>> {
         let find = |name: &str| {
             self.arrays
@@ -143,7 +144,8 @@ impl MeshArray {
         Self { name: self.name.clone(), on: self.on, number: self.number, values }
     }
 
-    /// The array of a triangulation: `corners` has the indices of each triangle's corners among those of the faces, `faces` the face of each.
+    /// Converts an array of a polygon mesh to one of triangles made from its polygons: for each triangle, `corners` holds the indices of
+    /// its corners among the polygons' corners, and `faces` its polygon.
     pub(in crate::geometry) fn of_triangles(self, corners: &[[usize; 3]], faces: &[usize]) -> Self {
         let values = match self.on {
             On::Vertices => self.values,

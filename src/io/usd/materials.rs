@@ -41,7 +41,7 @@ impl Look {
         }
     }
 
-    /// The schema of a prim that has a material, for the brackets after the prim's name.
+    /// The API schema that a prim with a material needs, as an entry of its metadata (in parentheses after its name).
     pub(in crate::io) const SCHEMA: &'static str = "prepend apiSchemas = [\"MaterialBindingAPI\"]";
 
     /// Binds a material to a prim.

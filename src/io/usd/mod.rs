@@ -22,7 +22,8 @@ pub struct MeshFrame<'a> {
     pub name: &'a str,
     /// Positions (m).
     pub points: &'a [Vec3],
-    /// Velocities (m/s) over the coming frame, one per point; none for a mesh that is a new one at each frame.
+    /// Velocities (m/s) over the coming frame (those of liquid on a terrain: at this frame), one per point; empty if the mesh has none,
+    /// like that of the base layer.
     pub velocities: &'a [Vec3],
     /// Triangles.
     pub triangles: &'a [[u32; 3]],
@@ -46,7 +47,7 @@ pub struct MeshPrim<'a> {
     pub name: String,
     /// Its material.
     pub look: Look,
-    /// Whether its frames have velocities; a mesh that is a new one at each frame has none.
+    /// Whether its frames may have velocities.
     pub moves: bool,
     /// The texture coordinates of its frames, if any.
     pub uvs: Option<&'a Uvs>,
@@ -108,7 +109,7 @@ pub struct StageTime {
     pub fps: f64,
 }
 
-/// A text in quotes, or an asset path between `@`.
+/// A quoted and escaped string.
 pub(super) fn quoted(text: &str) -> String {
     let escaped: String = text
         .chars()
@@ -121,6 +122,7 @@ pub(super) fn quoted(text: &str) -> String {
     format!("\"{escaped}\"")
 }
 
+/// An asset path between `@` delimiters.
 fn asset(path: &str) -> String {
     // Triple @ delimiters allow an @ inside.
     if path.contains('@') { format!("@@@{path}@@@") } else { format!("@{path}@") }
@@ -226,7 +228,7 @@ pub struct Clips<'a> {
 pub enum ClipPrims<'a> {
     /// Moving meshes, under a prim of the kind's name.
     Meshes(Vec<MeshPrim<'a>>),
-    /// A prim of points with the kind's name, as [`points::frame`] writes it; these points have its attributes.
+    /// A `Points` prim with the kind's name, as [`points::frame`] writes it; the points here only tell which attributes it declares.
     Points(Points),
 }
 

@@ -53,7 +53,8 @@ pub fn frame(name: &str, frame: i32, fps: f64, points: &Points) -> String {
     out
 }
 
-/// The declarations that [`frame`] writes for points with these attributes, without values: for the prim above them in a stage.
+/// The attribute declarations that [`frame`] writes for such points, without values: for the stage's prim whose value clips hold the
+/// points, and for the clip manifest.
 pub(in crate::io) fn declared(points: &Points, indent: &str) -> String {
     let mut out = format!("{indent}{EXTENT}\n{indent}{POSITIONS}\n");
     for (declared, interpolation) in declarations(points) {

@@ -46,7 +46,7 @@ pub trait AnyStage: Stage {
     #[doc(hidden)]
     fn precheck_frames(&self, ctx: &Context, upstream: &[DoneFrames], last: i32) -> Result<()>;
 
-    /// The pass to a frame, with the state loaded from which it takes the fewest steps.
+    /// Prepares a pass that makes `frame`, and loads the state from which that takes the fewest steps.
     #[doc(hidden)]
     fn start_pass<'a>(
         &'a self,

@@ -1,4 +1,4 @@
-//! Solids of simple moving shapes: obstacles for which no triangle is cast.
+//! Solids of simple moving shapes: obstacles that are intersected with vertical lines analytically, without triangles.
 
 use super::solids::Solid;
 use crate::error::{Error, Result};
@@ -140,8 +140,8 @@ fn root(square: f64) -> Option<f64> {
     (square >= 0.0).then(|| square.sqrt())
 }
 
-/// A sphere that moves from one end to the other sweeps the capsule. The top and the bottom of the line's part in it each lie on one of the
-/// sphere's positions.
+/// A sphere that moves from one end to the other sweeps the capsule. The top and the bottom of the line's part inside the capsule each lie
+/// on the sphere at one of its positions.
 fn of_capsule([from, to]: &[DVec3; 2], radius: f64, at: [f64; 2]) -> Option<[f64; 2]> {
     let segment = to - from;
     let [x, z] = [at[0] - from.x, at[1] - from.z];

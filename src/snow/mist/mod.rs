@@ -55,7 +55,8 @@ pub struct StepReport {
     pub sub_steps: usize,
     /// Iterations of all pressure projections.
     pub iterations: usize,
-    /// Largest divergence, times the cell, that a projection left, relative to the largest speed before.
+    /// Largest divergence that remained in the mist's own grid after a projection, times the edge of a cell, relative to the largest speed
+    /// before that projection.
     pub divergence: f32,
     /// Largest speed (m/s) on any axis.
     pub fastest: f32,
@@ -71,7 +72,8 @@ pub fn memory(tiles: usize) -> u64 {
     512 * tiles as u64 * BYTES_PER_CELL
 }
 
-/// Open fractions and speeds of faces, for tiles and the edge (m) of their cells, at a share 0..=1 of a step.
+/// Returns the open fractions and speeds of the faces, given the tiles, the edge (m) of their cells, and the time as a share (0..=1) of the
+/// step.
 pub type Boundary<'a> = dyn Fn(&Tiles, f32, f64) -> Result<Solids> + Sync + 'a;
 
 /// Inputs of a step of mist besides the mist itself.

@@ -1,5 +1,5 @@
-//! The full check for topology errors (thesis 2.8, "at every frame"), including those that no vertex detects: there the mesh is farther
-//! from the particles' surface than its detail, though each of its vertices was projected.
+//! The full check for topology errors (thesis 2.8, "at every frame"), including those that no vertex detects: places where the distance
+//! between the mesh and the particles' surface exceeds the detail, although each vertex was projected.
 //!
 //! A projected vertex is at its kept distance from phi = 0. So such an error lies between vertices, has no vertices, or is at vertices that
 //! never had a distance to keep:

@@ -106,8 +106,8 @@ impl Parts {
     }
 
     /// Those of `drops` (ascending) that contain too few particles, and those of `bubbles` (each with a position (m) on it) that lie in
-    /// such a drop; also the bounds (cells) of these drops. `Change::drop_dry` counts in the same way, so that no new mesh is removed at
-    /// once.
+    /// such a drop; also the bounds (cells) of these drops. `Change::drop_dry` counts in the same way, so that a newly made
+    /// part is not removed again immediately.
     fn specks(
         &self,
         phi: &Implicit,
@@ -175,7 +175,7 @@ impl Parts {
     }
 }
 
-/// Whether one of the feet, in ascending cells, lies in a cell or in one of the 26 around it.
+/// Whether any of `feet` (cells, sorted in ascending order) is this cell or one of the 26 around it.
 pub fn is_near(feet: &[Coord], cell: Coord) -> bool {
     (-1..=1).any(|x| {
         (-1..=1).any(|y| {

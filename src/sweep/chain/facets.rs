@@ -30,7 +30,8 @@ const HAIR: f64 = 0.005 * UNITS as f64;
 const THIN_HAIRS: f64 = THIN * UNITS as f64 / HAIR;
 /// Faces longer than this (cells) are sampled at more than one point.
 const SMALL: f32 = 1.5;
-/// A face is a [`SLIVER`] if it is longer than this (cells) but no line crosses it: lines are a cell apart and cross most such faces.
+/// A face is a [`SLIVER`] if it is longer than this (cells) but no line of [`Exposure`] crosses it: these lines run through the voxels,
+/// a cell apart, and cross most such faces.
 const LONG: f32 = 3.0;
 /// Distance between the samples of a long face (fixed-point units).
 const SPACING: f64 = 1.2 * UNITS as f64;
@@ -40,13 +41,13 @@ const CLOSER: f64 = 0.6 * UNITS as f64;
 const INSET: f64 = 0.05;
 /// Bisections that find where an edge enters the volume: to 1/16 of its length.
 const HALVINGS: usize = 3;
-/// Flag of a bin that is a stack, where the surface consists of patches.
+/// Flag of a bin that is a stack ([`Exposure::stacks`]: many sheets close together), where the surface consists of patches.
 const STACK: u8 = 4;
 /// Flag of any other bin.
 const LOOSE: u8 = 8;
 /// Flag of a long face that no line crosses.
 const SLIVER: u8 = 16;
-/// Flag of a small open face in a stack, which patches may not cover.
+/// Flag of a small open face in a stack, which the patches possibly miss.
 const SPECK: u8 = 32;
 /// The small faces of a stack are sampled only in bins with at most this many faces.
 const MANY: usize = 2000;

@@ -15,7 +15,7 @@ pub struct Touch {
     pub offset: f32,
     /// Velocity of the surface (m/s).
     pub velocity: V,
-    /// Friction of a grain that does not slide against it.
+    /// Friction coefficient for a grain at rest against the collider (static friction).
     pub friction: f32,
     /// Friction in this sub-step.
     pub friction_now: f32,
