@@ -4072,8 +4072,8 @@ frz_status frz_mist_step_points(frz_context *context,
                                 frz_mist_report *report);
 
 /**
- * Moves mist through a step, and adds what points raise along their paths: as frz_mist_step_points, for a host that knows where points
- * were before the step. For the same points and snow, the mist is the same as that of frz_mist_step, bit for bit.
+ * Moves mist through a step, and adds what points raise along their paths. Like frz_mist_step_points, but for a host that knows where
+ * points were before the step. For the same points and snow, the mist is the same as that of frz_mist_step, bit for bit.
  *
  * positions_before: double[3] for each point at the step's beginning (m), as positions; for a point born in the step its position at
  *     birth.
