@@ -124,7 +124,7 @@ impl Params {
 pub struct Thickening {
     /// Index of the scalar: an age for blood that clots; a dye for mixtures.
     pub scalar: usize,
-    /// Concentration up to which viscosity is the liquid's own, in the scalar's own measure.
+    /// Concentration up to which viscosity is the liquid's own, in the scalar's own unit.
     pub from: f64,
     /// Concentration from which on viscosity is `times` the liquid's own; it may be below `from`.
     pub to: f64,

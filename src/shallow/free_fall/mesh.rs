@@ -1,9 +1,9 @@
 //! A triangle mesh of the liquid in the air, written into the caller's buffers: a ball for each drop, and strands between consecutive drops
 //! of an overflow edge, and from the edge to the newest drop.
 //!
-//! The cross-section of a strand is the mean volume of its two drops divided by their distance. From a length of 9.02 radii, the
-//! fastest-growing wavelength in a jet of low viscosity (Rayleigh 1878), its liquid drains into its drops, and at twice that length it has
-//! broken. Drops in a strand are as thick as the strand.
+//! The cross-section of a strand is the mean volume of its drops (one at the overflow edge, else two) divided by its length. From a length
+//! of 9.02 radii, the fastest-growing wavelength in a jet of low viscosity (Rayleigh 1878), its liquid drains into its drops, and at twice
+//! that length it has broken. Drops in a strand are as thick as the strand.
 
 use super::Droplet;
 use crate::error::Result;

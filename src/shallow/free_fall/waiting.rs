@@ -29,7 +29,7 @@ pub(in crate::shallow) struct Waiting {
     /// Smoothed inflow of an interval (units), and the volume at the end of the last interval.
     pub steady: i64,
     pub before: i64,
-    /// How far its packets are ahead within the interval (in 2^-31 of it): a hash of the inflow at which the flow grew.
+    /// How far its packets are ahead within the interval (in 2^-31 of it): a hash of the inflow when the flow last grew.
     pub phase: u32,
     /// Impulse received from other overflow edges; 0 between intervals.
     pub gathered: i64,

@@ -4,7 +4,7 @@
 //! the sides, where the pillar of one cell and the liquid of the next are at the same height. The weight of the liquid above a face acts on
 //! it: rho g (eta - y) at the height y, where eta is the liquid's surface (in a flooded column, its head), integrated exactly over the
 //! pillar. A submerged ball has the buoyancy of its pillars. The stagnation pressure, rho w^2 / 2, acts on faces that the liquid runs into,
-//! and shear acts along all faces: over the depth of a film or of a flooded gap, or over half a cell at the sides.
+//! and shear acts along all faces: the velocity changes over the depth of a film or of a flooded gap, or over half a cell at the sides.
 
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
@@ -70,7 +70,7 @@ impl Shallow {
     /// 1,000). The liquid below a body is as the last step left it: after [`Shallow::set_bodies`], step first. Allocates nothing.
     ///
     /// # Errors
-    /// `Argument`: a density that is not positive and finite, a count of velocities or of outputs that is not that of the bodies, a
+    /// `Argument`: a density that is not positive and finite, a count of velocities or of outputs other than the count of bodies, a
     /// velocity that is not finite.
     pub fn loads(&self, density: f64, velocities: &[[f64; 3]], out: &mut [Load]) -> Result<()> {
         if !(density > 0.0 && density.is_finite()) {

@@ -48,7 +48,7 @@ impl Snapshot {
         snapshot
     }
 
-    /// Replaces the contents by the current state of a liquid, which may be another one than before. Copies only strips that have or had
+    /// Replaces the contents by the current state of a liquid, not necessarily the same one as before. Copies only strips that have or had
     /// liquid, and the columns if the terrain has changed. Allocates nothing, unless there are more columns than ever before.
     pub fn take(&mut self, shallow: &Shallow) {
         if self.terrain != shallow.identity.number {

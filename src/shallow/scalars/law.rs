@@ -53,7 +53,7 @@ impl Scalar {
 /// How a scalar changes besides being carried.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Law {
-    /// It does not change, as dye or salt.
+    /// It does not change, as dye, salt, or heat that is not lost.
     Dye,
     /// It halves in each half-life (s), 1e-6 to 1e12, as heat that is lost to a room.
     Decays(f64),

@@ -111,7 +111,7 @@ impl ThickenedPipes {
     fn find_relative_viscosity(&mut self, law: &Thickening, flow: &Flow) {
         let amounts = &flow.amounts;
         let range = amounts.scalars[law.scalar].range / LEVELS;
-        // The level at which viscosity begins to rise, and the part of the rise per level.
+        // The level at which viscosity begins to change, and the part of the change per level.
         let (from, per_level) = (law.from / range, range / (law.to - law.from));
         let line = Line { from, per_level, rise: (law.times - 1.0) as f32 };
         for run in runs(flow.active()) {

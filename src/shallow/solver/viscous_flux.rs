@@ -212,7 +212,7 @@ pub struct Row<'a> {
     pub south_depth: &'a [i32],
     /// Openness to the east and to the south.
     pub open: [&'a [f32]; 2],
-    /// Inertia divisors of the pipes to the east and to the south (`fast_films::packed`), in the strips of `is_light`.
+    /// Inertia divisors of the pipes to the east and to the south (`fast_films::packed`); only valid in the strips that `is_light` marks.
     pub light: &'a [u32],
     /// Whether the inertia of some pipes is reduced, for each strip.
     pub is_light: &'a [bool],

@@ -311,7 +311,7 @@ impl Placed {
             return 0;
         }
         let count = self.columns.len() as f64;
-        // Liquid that has found no room for a long time does not come later.
+        // Of the liquid that has found no room so far, no more than a step requests (or `MAX_PENDING` per column) comes later.
         self.pending = self.pending.min(requested.max(MAX_PENDING * count)) + requested;
         let mut share = (self.pending / count).floor().min(1e18) as i64;
         if let Kind::Absorber(capacity) = self.point.kind {

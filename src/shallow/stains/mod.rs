@@ -148,8 +148,8 @@ impl Stains {
         self.stain.is_empty()
     }
 
-    /// Advances to the liquid's time; call it once a frame. `positions` (m) are those of the vertices on the ground that the liquid has
-    /// now. Allocates nothing after the first call. Returns the volume that the ground has absorbed since the last call (m3).
+    /// Advances to the liquid's time; call it once a frame. `positions` are the present positions (m) of the vertices of the liquid's
+    /// ground. Allocates nothing after the first call. Returns the volume that the ground has absorbed since the last call (m3).
     ///
     /// # Errors
     /// `Argument`, and nothing changes: a count of vertices other than the mesh's; a vertex that is not finite; a liquid with other units,
@@ -223,7 +223,7 @@ impl Stains {
     /// # Errors
     /// As [`Stains::stains`].
     pub fn soaked(&self, out: &mut [f32]) -> Result<()> {
-        check_room(out.len(), "soaked", self.len(), "vertices")?;
+        check_room(out.len(), "soaked fractions", self.len(), "vertices")?;
         out.iter_mut().zip(self.each_soaked()).for_each(|(out, soaked)| *out = soaked);
         Ok(())
     }

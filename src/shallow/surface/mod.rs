@@ -20,7 +20,7 @@
 //! along the wet one; otherwise along the one with the larger sum of heights, and if these are equal from north-west to south-east. The
 //! surface ends at the centres of the outermost cells.
 //!
-//! If in a quartet only two columns are not linked, and their cells are side by side, there are two groups of three, whose triangles
+//! If of a quartet's four columns only two are not linked, and their cells are side by side, there are two groups of three, whose triangles
 //! overlap ([`Check::doubled`]): the liquid splits into two layers there.
 
 pub(super) mod buffers;

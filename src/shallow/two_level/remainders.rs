@@ -36,7 +36,7 @@ impl Contents {
         }
     }
 
-    /// The share of this that a count of its units has.
+    /// The share of this that belongs to a count of its units.
     pub fn part(&self, units: i64) -> Self {
         Self { units, amounts: part(&self.amounts, units, self.units) }
     }

@@ -169,7 +169,7 @@ fn fit_depths(depths: &mut [i64; 4], columns: &[Option<usize>; 4], units: i64) {
         if missing == 0 || count == 0 {
             return;
         }
-        // Only whole missing units per column are shared; an excess is taken equally from all.
+        // Of missing units, each column gets the same whole number; an excess is taken equally from all.
         let each = missing.div_euclid(count);
         for (at, depth) in depths.iter_mut().enumerate() {
             if takes(at, *depth) {

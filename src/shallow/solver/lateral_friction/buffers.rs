@@ -64,7 +64,7 @@ impl Numbers {
         &mut self.list[self.before..]
     }
 
-    /// 16 numbers, from `positions` before the first of a strip.
+    /// 16 numbers, the first of them this many positions before a strip.
     #[inline(always)]
     pub fn before(&self, strip: usize, positions: usize) -> &[f32; STRIP] {
         let at = self.before + strip * STRIP - positions;

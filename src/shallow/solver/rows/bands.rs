@@ -37,7 +37,7 @@ pub struct Bands {
     deepest: Vec<i32>,
     /// Whether columns of each row might fill up to their ceiling in this step.
     may_fill: Vec<bool>,
-    /// The minimum room of the columns of each row (units).
+    /// Lower bound of the room of the columns of each row (units).
     room: Vec<f32>,
     /// Whether each row might have full columns.
     may_be_full: Vec<bool>,

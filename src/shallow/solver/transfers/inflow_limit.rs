@@ -93,7 +93,7 @@ impl RowBuffers {
     }
 }
 
-/// The maximum inflow of a row's columns through links (units); `sums` are 0 before and after.
+/// The maximum inflow through links of any column of a row (units); `sums` are 0 before and after.
 pub fn max_link_inflow(inputs: &StepInputs, view: &BandView, row: usize, sums: &mut [i64]) -> f32 {
     let position = RowPositions::new(inputs.columns, row);
     for_each_link_end(inputs, view, row, false, |column, units| sums[position.of(column)] += units);

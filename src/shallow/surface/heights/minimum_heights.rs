@@ -33,11 +33,11 @@ const MIN_RISE: f64 = 1e-10;
 /// Distances between a thin film and the terrain's mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distance {
-    /// Global minimum: how far a wet vertex is at least above its base (cells).
+    /// Global minimum: the minimum height of a wet vertex above its base (cells).
     pub least: f64,
-    /// How far the surface is at least above the terrain's vertices (cells).
+    /// Minimum height of the surface above the terrain's vertices (cells).
     pub margin: f64,
-    /// How far the surface's rim is at least below the terrain's vertices and below the bases of dry columns (cells); more than the margin,
+    /// Minimum distance of the surface's rim below the terrain's vertices and below the bases of dry columns (cells); more than the margin,
     /// as the terrain may be lower between its vertices.
     pub rim: f64,
 }
