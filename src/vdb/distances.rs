@@ -14,7 +14,7 @@ const MIN_EDGES: usize = 64;
 /// Valid range of the median slope (difference over length) along such edges. For distances it is 0.67 to 1, depending on the orientation
 /// of the surface.
 const SLOPES: [f64; 2] = [0.4, 1.6];
-/// Range of the median difference itself in which values are taken for distances in voxels.
+/// Range of the median difference (not divided by the length) that identifies distances in voxels.
 const IN_VOXELS: [f64; 2] = [0.5, 1.1];
 /// Minimum width of the band on each side (cells): with less, no tool measures or moves the surface correctly.
 const MIN_BAND: f64 = 1.9;

@@ -16,7 +16,7 @@ use serde::Serialize;
 use super::output;
 use super::session::{Failure, OrFailure, Session};
 
-/// Read every input of every frame of a scene, and print sizes, memory and disk; simulates nothing.
+/// Read every input of every frame of a scene, and print its sizes, memory and disk, without simulating anything.
 ///
 /// For an output folder: read every file that a run wrote there, and name those that are damaged or missing.
 #[derive(clap::Args)]

@@ -32,7 +32,7 @@ impl Pattern {
         };
         let digits_at = |start: usize| text[start..].bytes().take_while(u8::is_ascii_digit).count();
         let width = |digits: &str| if digits.is_empty() { Some(1) } else { digits.parse().ok() };
-        // A % that is not followed by a d, with or without digits before it, is a part of the name.
+        // A % that no d follows, directly or after digits, is a part of the name.
         for (start, _) in text.rmatch_indices('%') {
             let end = start + 1 + digits_at(start + 1);
             if text[end..].starts_with('d') {

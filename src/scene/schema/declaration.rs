@@ -122,7 +122,7 @@ pub struct Key {
     pub kind: Kind,
     /// Its default.
     pub fallback: Fallback,
-    /// Presets with their defaults, in TOML: that of the preset which the table's `preset`, or `liquid`, names replaces `fallback`.
+    /// Presets with their defaults, in TOML: the default of the preset that the table's `preset` or `liquid` names replaces `fallback`.
     pub presets: &'static [(&'static str, &'static str)],
     /// Its line in a starter scene.
     pub example: Example,

@@ -68,7 +68,7 @@ pub const KEYS: &[Key] = &[
     key(STEP, "shallow", "kept", Number(0.0, 1.0, ""), or("0.5"))
         .means("share of its momentum that liquid keeps over a second, apart from viscous losses"),
     key(STEP, "shallow", "pace", Choice(&["exact", "realtime"]), or("\"exact\""))
-        .means("exact: as many steps as waves need; realtime: steps of at most `step`, which slow waves in deep liquid and fast films on slopes"),
+        .means("exact: as many steps as waves need; realtime: steps of at most `step`, which slow down waves in deep liquid and fast films on slopes"),
     key(STEP, "shallow", "step", Number(1.0e-6, 1.0, "s"), or("0.003")).means("longest step of realtime (s)"),
     key(FIRST, "shallow", "friction", Choice(&["ground", "walls"]), or("\"ground\""))
         .means("where viscous drag acts: ground: accurate for liquid that is far wider than deep; walls: also at walls and ceilings, for channels and ducts, which takes longer"),

@@ -60,7 +60,7 @@ enum GroundBelow {
 }
 
 impl Inputs {
-    /// Reads every input; of sequences the first frame, after checking that no frame is missing.
+    /// Reads every input (of a sequence only the first frame), after checking that no frame is missing.
     ///
     /// # Errors
     /// Errors in files or keys, with file and key.

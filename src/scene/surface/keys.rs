@@ -19,7 +19,7 @@ pub const KEYS: &[Key] = &[
     key(FIRST, "surface", "mesh", File(&EXTENSIONS), optional("\"spot.ply\"").shown())
         .means("the mesh at the first frame, in the particles' space; left out: the particles' own surface at that frame"),
     key(STEP, "surface", "resculpt", File(&EXTENSIONS), optional("\"sculpts/spot.%04d.ply\""))
-        .means("edited meshes, a sequence: each of its files replaces the mesh at its frame, which is after the first"),
+        .means("edited meshes, a sequence: each file replaces the mesh at its frame, which must be after the first"),
     key(FIRST, "surface", "scale", Number(1.0e-9, 1.0e9, ""), or("1.0"))
         .means("from the files' unit to metres: 0.01 for centimetres"),
     key(FIRST, "surface", "up", Choice(&["y", "z"]), or("\"y\"")).means("the files' upward axis: y or z"),

@@ -186,7 +186,7 @@ impl Inputs {
     }
 }
 
-/// The solids of a terrain, and whether it was reversed, as a mesh of which no triangle faces up.
+/// The solids of a terrain, and whether it was reversed, which happens to a mesh without a triangle that faces up.
 ///
 /// # Errors
 /// A terrain without a surface that faces up; cancel.

@@ -18,7 +18,7 @@ const PLY_PER_VERTEX: f64 = 50.0;
 const USDA_PER_POSITION: f64 = 20.0;
 const USDA_PER_INDEX: f64 = 7.0;
 const PLY_PER_POSITION: f64 = 8.0;
-/// Bytes of a grain in each kind of file, and in a packed state; that for files of changes was measured while a character walks.
+/// Bytes of a grain in each kind of file, and in a packed state; the value for files of changes was measured while a character walks.
 const GRAIN_VDB: f64 = 49.0;
 const GRAIN_CHANGES: f64 = 28.0;
 const GRAIN_PLY: f64 = 50.0;

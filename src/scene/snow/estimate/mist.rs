@@ -123,7 +123,7 @@ fn rounded(length: f64) -> f64 {
 }
 
 /// The last frame, up to `last`, of existing mist, and the maximum count of cells in a frame, converted to cells of an edge `cell` (m).
-/// `None` if there was no mist yet, or if no file is left that tells the size of its cells.
+/// `None` if there was no mist yet, or if no file is left that gives the size of its cells.
 fn existing_cells(stored: &DoneFrames, cell: f64, last: i32) -> Result<Option<(i32, f64)>> {
     let (mut end, mut counts) = (None, Vec::new());
     for frame in stored.frames().filter(|frame| *frame <= last) {

@@ -354,7 +354,7 @@ pub struct ObjectReport {
     pub fastest_frame: i32,
     /// First and last frame at which its bounds touch the snow's.
     pub touches: Option<[i32; 2]>,
-    /// Its lowest position, if the ground is known and the object passes over it.
+    /// Its lowest position relative to the ground, if the ground is known and the object passes over it.
     pub deepest: Option<Deepest>,
     /// The speed that its clip requires of its keys, and the slip of its feet.
     pub walk: Option<FootSlip>,

@@ -68,7 +68,7 @@ impl Snow {
     /// Checks the keys in combination.
     ///
     /// # Errors
-    /// Keys that exclude each other, or a key without one that it needs; an area without width or depth.
+    /// Keys that exclude each other, or a key without one that it needs; an area without extent; an origin without meshes.
     pub(in crate::scene) fn check(table: &Table, values: &Values) -> Result<()> {
         let snow = values.table("snow");
         let (ground, top) = (snow.value("ground"), snow.value("top"));

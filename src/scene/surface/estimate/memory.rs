@@ -28,7 +28,7 @@
 //! | vertex of the mesh in a coming frame, except the next | position 24, distance 4, flags 2, size and drift 20, velocities 24, name 8 | 82 |
 //! | triangle of such a mesh | corners twice 24, the mask 8 | 32 |
 //! | particle, if particles have ids and the mesh carries data | its id and its first position | 32 |
-//! | triangle of the first mesh, or of the last edited one, in that case | in a tree | 84 |
+//! | triangle of the first mesh or of the last edited one, under the same conditions | in a tree | 84 |
 //! | number that the mesh carries | in two frames 16, state 16; 8 in each coming frame | 32 |
 //! | vertex of a mesh that carries data | source of its numbers | 40 |
 //! | triangle of such a mesh | source of its numbers 80, in a tree 84 | 164 |
