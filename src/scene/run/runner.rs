@@ -47,8 +47,8 @@ impl<'a> Run<'a> {
     /// Opens or creates the folder, finds the frames that are done, loads the states from which the stages start, and writes the resolved
     /// scene into the folder. The run makes the stages named in `only`, or all.
     ///
-    /// With `from`, the frames before it are kept, whatever settings they were made with. All others of these stages, and those
-    /// from it on of stages downstream, are removed; of these stages, `frames` are made again.
+    /// With `from`, the frames before it are kept, whatever settings they were made with. All other frames of these
+    /// stages, and such frames of stages downstream of them, are removed; these stages make those in `frames` again.
     ///
     /// # Errors
     /// A folder that cannot be written, that another run writes into, or whose frames were made with other settings or inputs; a damaged

@@ -77,7 +77,7 @@ impl Forecast {
         }))
     }
 
-    /// Fails if there would be too many grains, or if they would need too much memory. A forecast that is an upper bound may fail needlessly.
+    /// Fails if there would be too many grains, or if they would need too much memory. An upper bound may fail needlessly.
     ///
     /// # Errors
     /// More than `grains.max` by over a tenth, which exceeds the error of estimates; more memory than the limit (bytes).
