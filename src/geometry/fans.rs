@@ -59,7 +59,7 @@ impl Fans {
     }
 
     /// Whether two neighbours may be merged: their only common neighbours are the two corners opposite their edge, and each of these, which
-    /// lose a triangle, keeps at least three. That also preserves tetrahedra.
+    /// loses a triangle, keeps at least three. That also preserves tetrahedra.
     pub fn may_join(&self, triangles: &[[u32; 3]], a: u32, b: u32) -> bool {
         let [mut shared, other] = [a, b].map(|vertex| self.ring(triangles, vertex));
         shared.retain(|vertex| other.binary_search(vertex).is_ok());

@@ -13,7 +13,7 @@ pub struct Params {
     pub change: f64,
     /// How particles carry vertices.
     pub weighting: Weighting,
-    /// Time (s) in which half of the detail fades, over 0; infinite: detail does not fade with time (suggested in thesis 2.8).
+    /// Time (s) in which half of the detail fades (suggested in thesis 2.8), over 0; infinite: detail does not fade with time.
     pub half_life: f64,
     /// How much detail fades where the mesh is strained: it shrinks to exp(-fade) times its size when lengths change by a factor of e;
     /// 0..=1000.
@@ -26,8 +26,8 @@ pub struct Params {
     pub every: bool,
     /// If the mesh is rebuilt: minimum count of particles in a part of the mesh, 0..=1,000,000. Parts with fewer are removed, and drops
     /// with fewer get no mesh; with 0 and 1 only parts without any particle inside are removed. If at least one particle lies inside a
-    /// part, those outside within half a spacing of it count too. If the mesh has only one part, this rule does not
-    /// remove it.
+    /// part, those outside within half a spacing of it count too. If the mesh has only one part, this rule
+    /// does not remove it.
     pub min_drop: usize,
 }
 

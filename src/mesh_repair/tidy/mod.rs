@@ -1,8 +1,9 @@
 //! Removes slivers from the triangles that a repair created: pieces of a cut as thin as rounding, points beside vertices or at the same
 //! position, corners almost on the opposite edge. A new vertex is merged into a neighbour, or an edge is flipped ([`editable_mesh`]).
 //!
-//! Quality is the altitude of a triangle on its longest edge, divided by that edge: 0.87 at best. Edges shorter than [`SHORT`] count as
-//! that long: triangles among almost coincident points may look well shaped by chance, but degenerate once their positions have 32 bits.
+//! Quality is the altitude of a triangle on its longest edge, divided by that edge's length: 0.87 at most. Edges shorter than [`SHORT`]
+//! count as that long: triangles among almost coincident points may look well shaped by chance, but degenerate once their positions have
+//! 32 bits.
 
 mod editable_mesh;
 

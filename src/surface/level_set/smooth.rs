@@ -26,8 +26,8 @@ const MAX_REACH: f64 = 1.1;
 /// Vertices of a task.
 const PIECE: usize = 1024;
 
-/// Smooths a closed mesh in `passes` passes; each of its connected parts keeps its volume. A part that would reach farther from its centre
-/// after a pass than 1.1 times as far as at first stays as it was before that pass: it is as smooth as possible. Triangles do not change.
+/// Smooths a closed mesh in `passes` passes; each of its connected parts keeps its volume. A part whose reach from its centre would be
+/// over 1.1 times the initial reach after a pass stays as it was before that pass: it is as smooth as possible. Triangles do not change.
 ///
 /// # Errors
 /// Cancel.

@@ -13,8 +13,8 @@ pub(in crate::surface) const WINDOW: u32 = 8;
 pub(in crate::surface) struct Drift {
     /// Steps since the reference, less than [`WINDOW`].
     pub steps: u32,
-    /// The displacement of each vertex (m). Vertices created since then began with 0, or with the mean of the ends of the edge that they
-    /// split.
+    /// The displacement of each vertex (m). Vertices created since then began with 0, or with the mean displacement of the ends of the
+    /// edge that they split.
     pub vertices: Vec<[f32; 3]>,
 }
 

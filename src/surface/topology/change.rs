@@ -196,7 +196,7 @@ fn find_unfit_cells(
     (phi, distances): (&Implicit, &Distances),
 ) -> Result<(Shape, CellSet)> {
     let fixed = in_cells.iter().map(|position| lattice.fix(*position)).collect::<Result<Vec<_>>>()?;
-    // Some 100 bytes for each edge of the grid that the mesh pierces: up to 1.7 edges for each area of a cell's face.
+    // Some 100 bytes for each edge of the grid that the mesh pierces: up to 1.7 edges per area of a cell's face.
     let area = |corners: &[u32; 3]| normal(&corners.map(|corner| in_cells[corner as usize])).norm() / 2.0;
     let faces: f64 = mesh.triangles.iter().map(area).sum();
     ctx.allow("the mesh's cells (larger ones need less)", (170.0 * faces).min(1e18) as u64)?;

@@ -106,8 +106,8 @@ impl Parts {
     }
 
     /// Those of `drops` (ascending) that contain too few particles, and those of `bubbles` (each with a position (m) on it) that lie in
-    /// such a drop; also the bounds (cells) of these drops. `Change::drop_dry` counts in the same way, so that a newly made
-    /// part is not removed again immediately.
+    /// such a drop; also the bounds (cells) of these drops. `Change::drop_dry` counts in the same way, so that a
+    /// newly made part is not removed again immediately.
     fn specks(
         &self,
         phi: &Implicit,

@@ -65,7 +65,8 @@ struct Scratch {
     of_position: Near,
 }
 
-/// Carries positions (m) along the paths of particles whose spacing is `spacing` (m). Returns the count of parts of the frame.
+/// Carries positions (m) along the paths of particles whose spacing is `spacing` (m). Returns the count of parts into which the
+/// frame is divided.
 ///
 /// # Errors
 /// Particles too far apart; cancel.

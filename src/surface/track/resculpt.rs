@@ -8,12 +8,12 @@ use crate::surface::report::StepReport;
 use crate::surface::tracked_mesh::Tracker;
 
 impl Tracker {
-    /// Replaces the mesh by an edited one (m) with any vertices and triangles. `particles` are those of the tracker's present frame: those
-    /// to which the last step went, or with which it began. The distance of each vertex is measured anew and kept from there on; the
+    /// Replaces the mesh by an edited one (m) with any vertices and triangles. `particles` are those of the tracker's current frame: those
+    /// to which the last step went, or with which it began. The distance of each vertex is measured anew and kept from then on; the
     /// parameters stay, detail retention is replaced ([`Tracker::set_detail_retention`]), no vertex is flagged. The report is that of
     /// [`Tracker::begin`]. After an error the tracker is unchanged.
     ///
-    /// States saved from then on contain the edited mesh's triangles; [`Tracker::resume`] still takes the initial mesh.
+    /// States saved after this contain the edited mesh's triangles; [`Tracker::resume`] still takes the initial mesh.
     ///
     /// # Errors
     /// As [`Tracker::begin`] and [`Tracker::set_detail_retention`].

@@ -23,8 +23,8 @@ use crate::sweep::window::Window;
 /// Multiplies the number of steps with which a vertex's path in one step would be as long as the pieces that edges are split into; in
 /// measurements, this value gave the fewest faces and the shortest time.
 const STEP_FACTOR: f64 = 1.5;
-/// The faces that edges sweep need no more steps than would make paths of this length (cells), or than [`MAX_OVER_ARCS`] times the number
-/// that arcs need, whichever is more; also measured.
+/// The faces that edges sweep get at most as many steps as make each path this long (cells), or [`MAX_OVER_ARCS`] times as many as arcs
+/// need, whichever is more; also measured.
 const MIN_PATH: f64 = 4.0;
 const MAX_OVER_ARCS: f64 = 1.5;
 /// Maximum number of steps in an interval between two breaks of a motion.

@@ -1,7 +1,7 @@
 //! The Laplace equation of the topology matching, and its two solvers (thesis 2.4.1).
 //!
 //! Nodes are red or black, by the parity of x + y + z, so that all neighbours of a red node are black and the reverse: nodes of one colour
-//! do not depend on each other, and can be updated in any order, by any number of threads: the results have the same bits.
+//! do not depend on each other, and can be updated in any order, by any number of threads, with the same result bit for bit.
 
 use rayon::prelude::*;
 
