@@ -12,8 +12,8 @@
  * Handles: the caller owns what it receives through an out-pointer, and destroys it with the destroy function of its
  * kind, which ignores NULL. A returned const pointer is lent. Never pass memory of frazil to free(). Only one call at a
  * time may use a handle (else FRZ_ERROR_BUSY), but any number may read it; handles may move between threads, and
- * distinct handles work in parallel. After FRZ_ERROR_INTERNAL the handles of that call return FRZ_ERROR_POISONED and can
- * only be destroyed.
+ * distinct handles work in parallel. After FRZ_ERROR_INTERNAL the context, and the handles that the call was changing,
+ * return FRZ_ERROR_POISONED and can only be destroyed.
  *
  * Input arrays: frz_view, lent for the duration of the call. Output arrays: frz_span, memory of the caller; query the
  * count first. Counts, strides, indices and the finiteness of numbers are checked once, on entry.
@@ -111,7 +111,7 @@
 #endif
 
 /**
- * In place of the index of a scalar: none.
+ * A scalar index that means no scalar.
  */
 #define FRZ_SHALLOW_NO_SCALAR 4294967295
 
@@ -121,12 +121,12 @@
 #define FRZ_SHALLOW_ON_TRIANGLE 1
 
 /**
- * In place of a layer in frz_shallow_volume: all layers.
+ * A layer index that means all layers, for frz_shallow_volume.
  */
 #define FRZ_SHALLOW_ALL_LAYERS 4294967295
 
 /**
- * In frz_shallow_sample.column: there is no column at the point.
+ * A column index that means no column, in frz_shallow_sample.
  */
 #define FRZ_SHALLOW_NO_COLUMN 4294967295
 
@@ -195,7 +195,7 @@ enum frz_status
      */
     FRZ_ERROR_OPENVDB = 6,
     /**
-     * An internal invariant was violated: a bug in frazil. The objects of the call are poisoned.
+     * An internal invariant was violated: a bug in frazil. The context, and the handles that the call was changing, are poisoned.
      */
     FRZ_ERROR_INTERNAL = 7,
     /**
@@ -327,7 +327,7 @@ enum frz_grains_attribute
      */
     FRZ_GRAINS_ACTIVE = 7,
     /**
-     * int32_t: 1 if it is trapped: inside a surface, with no room outside all surfaces nearby (trapped).
+     * int32_t: 1 if it is trapped: inside a surface, with no position nearby that is outside of all surfaces (trapped).
      */
     FRZ_GRAINS_TRAPPED = 8,
 };
@@ -2805,8 +2805,9 @@ typedef struct {
      */
     uint32_t flags;
     /**
-     * Index of the scalar that stains (frz_shallow_set_scalars), from 0. A stain approaches its concentration divided by its range,
-     * clamped to 0 to 1, so that clear liquid washes stains off. Default FRZ_SHALLOW_NO_SCALAR: any liquid stains, fully.
+     * Index of the scalar that stains (frz_shallow_set_scalars), from 0. A stain approaches the concentration of this scalar
+     * divided by its range, clamped to 0 to 1, so that clear liquid washes stains off. Default FRZ_SHALLOW_NO_SCALAR: any liquid stains,
+     * fully.
      */
     uint32_t scalar;
     /**
@@ -3152,8 +3153,8 @@ frz_status frz_mesh_attribute(const frz_mesh *mesh,
  * mesh: not modified.
  * cell: edge of a cell (m), 1e-9 to 1e6, about as long as the mesh's edges: where the mesh is rebuilt, thinner features may be lost.
  *     FRZ_ERROR_ARGUMENT if the mesh reaches farther than 131072 cells from its middle, encloses nothing, or would be lost almost
- *     entirely. Smaller losses cause a warning: of more than half of the volume, or of an extent of more than two cells and more than a
- *     twentieth.
+ *     entirely. Smaller losses cause a warning: if less than half of the volume is left, or a side of the bounding box has moved inward
+ *     by more than two cells and more than a twentieth of the longest side.
  * out: receives the new mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
  * report: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
  *
@@ -3986,7 +3987,7 @@ frz_status frz_mist_set_params(frz_mist *mist,
  * grains: the grains after their step; they are only read. NULL: none raise mist.
  * base: the layer after its step, around which the air flows; it is only read. NULL: there is none.
  * wind: a grid of velocities (m/s) that the air approaches where there is mist: half of the difference is gone after a tenth of a second.
- *     A component beyond 1000 m/s where there is air is FRZ_ERROR_ARGUMENT. NULL: only frz_mist_params.wind.
+ *     Where there is air, a component that is beyond 1000 m/s or not finite is FRZ_ERROR_ARGUMENT. NULL: only frz_mist_params.wind.
  * bodies: count bodies that bound the air and carry it along; NULL with a count of 0. Bodies that do not move have no positions_end. If
  *     the openings of a body exceed a tenth of its area, air flows around both of its sides. A body with a vertex that moves faster than
  *     100 m/s is treated as jumping: it stands at positions_end for the whole step.

@@ -22,7 +22,7 @@ class Pool(Handle):
 class Context(Handle):
     """A computation: its cancel flag, progress, polls and warnings, on worker threads of its own or on those of a Pool.
 
-    poll(stage, stages_done, seconds) is called on this thread at least some ten times per second; stage is the name of the
+    poll(stage, stages_done, seconds) is called on this thread at least about ten times per second; stage is the name of the
     running phase. A true return value cancels. log(text) receives warnings. An exception in either of them, or Ctrl-C, ends the
     running call, which changes nothing and raises this exception.
     """

@@ -7,7 +7,7 @@ import numpy as np
 from ._library import GrainsParams, GrainsReport, Handle, Span, View, call, made, rows, saved, span, view
 from .snow import bodies_of
 
-# Attributes by their usual names: the number in the header, the type, and the number of components.
+# Attributes by their usual names: the value in the C enum, the type, and the number of components.
 ATTRIBUTES = {
     "P": (0, np.float32, 3), "P64": (1, np.float64, 3), "v": (2, np.float32, 3), "id": (3, np.int64, 1),
     "pscale": (4, np.float32, 1), "source_frame": (5, np.int32, 1), "rest": (6, np.float32, 3),

@@ -14,8 +14,8 @@ BLOSC, ZIP, NONE = 0, 1, 2
 
 
 class Leaf(NamedTuple):
-    """A block of 8 x 8 x 8 voxels: its minimum voxel, its values [x, y, z] or [x, y, z, component], and which voxels are
-    active."""
+    """A block of 8 x 8 x 8 voxels: the index of its minimum voxel, its values [x, y, z] or [x, y, z, component], and which
+    voxels are active."""
 
     origin: tuple
     values: np.ndarray

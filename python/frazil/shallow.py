@@ -18,13 +18,13 @@ PACES = {"realtime": 0, "exact": 1}
 BORDERS = {"closed": 0, "open": 1, "absorbing": 2}
 SECTIONS = {"wetted": 0, "whole": 1}
 FRICTIONS = {"ground": 0, "walls": 1}
-# Arrays of columns: the number in the header, the type, and the number of components.
+# Arrays of columns: the value in the C enum, the type, and the number of components.
 ARRAYS = {
     "depth": (0, np.float32, 1), "base": (1, np.float32, 1), "ceiling": (2, np.float32, 1), "cell": (3, np.int32, 2),
     "layer": (4, np.uint32, 1), "flux_east": (5, np.float32, 1), "flux_south": (6, np.float32, 1),
     "velocity": (7, np.float32, 2),
 }
-# Arrays that are lent: the number in the header, and the type.
+# Arrays that are lent: the value in the C enum, and the type.
 LENT = {
     "depth": (0, c.c_int32), "base": (1, c.c_int32), "ceiling": (2, c.c_int32), "flux_east": (3, c.c_float),
     "flux_south": (4, c.c_float),
@@ -191,7 +191,7 @@ class Shallow(Handle):
     liquid: "water", "blood", "paint", "honey" or "thinning blood".
     pace: "realtime" or "exact". border: "closed", "open" or "absorbing". section: "wetted" or "whole". friction: "ground" or "walls".
     Further parameters, as in frz_shallow_params: viscosity, thinnest, thinning_time, thinning_power, gravity, kept, longest_step; falls_most over 0
-    (for instance 8192) lets liquid fall freely, as falls_height, falls_interval and falls_drop state; rest (m/s); thickening_scalar, the index
+    (for instance 8192) lets liquid fall freely, subject to falls_height, falls_interval and falls_drop; rest (m/s); thickening_scalar, the index
     of the scalar that viscosity depends on (by default None), with thickening_from, thickening_to and thickening_times.
     """
 
@@ -281,7 +281,7 @@ class Shallow(Handle):
         return out.value
 
     def pour(self, at, volume, radius=0.0):
-        """Pours in a volume (m3; negative: takes it out) around a position (m). Returns the volume that was poured in."""
+        """Pours in a volume (m3; negative: takes it out) around a position (m). Returns the volume that was poured in (negative: taken out)."""
         out = c.c_double()
         call("shallow_pour", self.pointer, (c.c_double * 3)(*at), radius, volume, c.byref(out))
         return out.value

@@ -75,7 +75,7 @@ class ShallowDetail(Handle):
         return out.value
 
     def pour(self, at, volume, radius=0.0):
-        """Pours in a volume (m3; negative: takes it out) around a position (m). Returns the volume that was poured in."""
+        """Pours in a volume (m3; negative: takes it out) around a position (m). Returns the volume that was poured in (negative: taken out)."""
         out = c.c_double()
         call("shallow_detail_pour", self.pointer, (c.c_double * 3)(*at), radius, volume, c.byref(out))
         return out.value

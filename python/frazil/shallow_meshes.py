@@ -19,8 +19,8 @@ PARTS = {
 
 
 class Surface(NamedTuple):
-    """The surface of a liquid: positions (n, 3), triangles (t, 3) that face up; the other fields if they were
-    requested, else None."""
+    """The surface of a liquid: positions (n, 3), triangles (t, 3) that face up; scalars if the liquid carries
+    any, else None; the other fields if they were requested, else None."""
 
     positions: np.ndarray
     triangles: np.ndarray

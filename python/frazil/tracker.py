@@ -7,7 +7,7 @@ import numpy as np
 
 from ._library import Handle, ParticlesDesc, TrackerParams, TrackerReport, View, call, made, rows, saved, span, view
 
-# Arrays by their usual names: the number in the header, the type, and the number of components.
+# Arrays by their usual names: the value in the C enum, the type, and the number of components.
 ARRAYS = {
     "P": (0, np.float32, 3), "P64": (1, np.float64, 3), "delta": (2, np.float32, 1), "flagged": (3, np.int32, 1),
 }
@@ -100,7 +100,8 @@ class Tracker(Handle):
         return params
 
     def set_params(self, **more):
-        """Sets how the mesh follows from the next step on. Parameters not given take their defaults; spacing, cell and rebuild cannot change."""
+        """Sets how the mesh follows from the next step on. Parameters not given take their defaults. spacing and rebuild stay;
+        cell must be the one that the tracker was created with."""
         params = self._params(self._spacing, **{"rebuild": self._rebuild} | more)
         call("tracker_set_params", self.pointer, c.byref(params))
 

@@ -805,7 +805,7 @@ class Shallow(unittest.TestCase):
         np.testing.assert_array_equal(snapshot.surface(other).scalars[0], surface.scalars[0])
         for make, text in (
             (lambda: milk.set_poured((1,)), "1 elements, but there are 2 scalars"), (lambda: milk.set_poured((2, 0)), "a concentration of 2"),
-            (lambda: milk.concentrations(2), "scalar = 2 is out of range: 2 are set"), (lambda: milk.set_scalars([frazil.Scalar("")]), "name is empty"),
+            (lambda: milk.concentrations(2), "scalar = 2 is out of range: the count is 2"), (lambda: milk.set_scalars([frazil.Scalar("")]), "name is empty"),
             (lambda: milk.set_params(falls_most=3), "falls cannot change"), (lambda: milk.find_lifts(), "was not made with a mesh"),
             (lambda: milk.surface(lifted=True), "frz_shallow_find_lifts was not called"),
         ):
@@ -867,7 +867,7 @@ class Shallow(unittest.TestCase):
         blood.set_params(gravity=(1, -9.81, 0))
         for make, text in (
             (lambda: self.spill(ctx, viscosity=-1), "viscosity = -1"), (lambda: blood.set_params(border="open"), "border cannot change"),
-            (lambda: blood.step(0), "a frame of 0 s"), (lambda: blood.moved(0), "out of range: 0 are set"),
+            (lambda: blood.step(0), "a frame of 0 s"), (lambda: blood.moved(0), "out of range: the count is 0"),
         ):
             with self.assertRaisesRegex(frazil.Error, text):
                 make()

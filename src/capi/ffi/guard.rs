@@ -26,7 +26,7 @@ pub enum frz_status {
     FRZ_CANCELLED = 5,
     /// OpenVDB cannot do this, for a reason that no other status covers.
     FRZ_ERROR_OPENVDB = 6,
-    /// An internal invariant was violated: a bug in frazil. The objects of the call are poisoned.
+    /// An internal invariant was violated: a bug in frazil. The context, and the handles that the call was changing, are poisoned.
     FRZ_ERROR_INTERNAL = 7,
     /// An earlier call with the handle returned FRZ_ERROR_INTERNAL: it can only be destroyed.
     FRZ_ERROR_POISONED = 8,

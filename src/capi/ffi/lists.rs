@@ -128,6 +128,6 @@ pub(in crate::capi) unsafe fn numbers<const N: usize>(first: *const f64, name: &
 
 /// Checks an index of one of the `count` things that a host has set; `name` is that of the argument.
 pub(in crate::capi) fn check_index(name: &str, index: usize, count: usize) -> Outcome<usize> {
-    refuse(index >= count, || format!("{name} = {index} is out of range: {count} are set"))?;
+    refuse(index >= count, || format!("{name} = {index} is out of range: the count is {count}"))?;
     Ok(index)
 }

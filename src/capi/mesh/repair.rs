@@ -72,8 +72,8 @@ impl From<RepairReport> for frz_repair_report {
 /// mesh: not modified.
 /// cell: edge of a cell (m), 1e-9 to 1e6, about as long as the mesh's edges: where the mesh is rebuilt, thinner features may be lost.
 ///     FRZ_ERROR_ARGUMENT if the mesh reaches farther than 131072 cells from its middle, encloses nothing, or would be lost almost
-///     entirely. Smaller losses cause a warning: of more than half of the volume, or of an extent of more than two cells and more than a
-///     twentieth.
+///     entirely. Smaller losses cause a warning: if less than half of the volume is left, or a side of the bounding box has moved inward
+///     by more than two cells and more than a twentieth of the longest side.
 /// out: receives the new mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
 /// report: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
 ///

@@ -70,7 +70,7 @@ pub enum frz_shallow_friction {
     FRZ_SHALLOW_WALLS = 1,
 }
 
-/// In place of the index of a scalar: none.
+/// A scalar index that means no scalar.
 pub const FRZ_SHALLOW_NO_SCALAR: u32 = 0xFFFF_FFFF;
 
 use frz_liquid::*;

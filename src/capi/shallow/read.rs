@@ -33,10 +33,10 @@ pub struct frz_shallow_info {
 
 sized32!(frz_shallow_info);
 
-/// In place of a layer in frz_shallow_volume: all layers.
+/// A layer index that means all layers, for frz_shallow_volume.
 pub const FRZ_SHALLOW_ALL_LAYERS: u32 = 0xffff_ffff;
 
-/// In frz_shallow_sample.column: there is no column at the point.
+/// A column index that means no column, in frz_shallow_sample.
 pub const FRZ_SHALLOW_NO_COLUMN: u32 = 0xffff_ffff;
 
 /// Column arrays that frz_shallow_read copies. An index without a column has the cell (-1, -1), no depth, and a ceiling at its base.

@@ -21,8 +21,9 @@ pub struct frz_shallow_staining {
     pub struct_size: u32,
     /// Must be 0.
     pub flags: u32,
-    /// Index of the scalar that stains (frz_shallow_set_scalars), from 0. A stain approaches its concentration divided by its range,
-    /// clamped to 0 to 1, so that clear liquid washes stains off. Default FRZ_SHALLOW_NO_SCALAR: any liquid stains, fully.
+    /// Index of the scalar that stains (frz_shallow_set_scalars), from 0. A stain approaches the concentration of this scalar
+    /// divided by its range, clamped to 0 to 1, so that clear liquid washes stains off. Default FRZ_SHALLOW_NO_SCALAR: any liquid stains,
+    /// fully.
     pub scalar: u32,
     /// Must be 0.
     pub reserved: u32,

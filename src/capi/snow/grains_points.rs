@@ -29,7 +29,7 @@ pub enum frz_grains_attribute {
     FRZ_GRAINS_REST = 6,
     /// int32_t: 1 if it is awake, 0 if it rests (active).
     FRZ_GRAINS_ACTIVE = 7,
-    /// int32_t: 1 if it is trapped: inside a surface, with no room outside all surfaces nearby (trapped).
+    /// int32_t: 1 if it is trapped: inside a surface, with no position nearby that is outside of all surfaces (trapped).
     FRZ_GRAINS_TRAPPED = 8,
 }
 

@@ -190,7 +190,7 @@ pub unsafe extern "C" fn frz_mist_set_params(
 /// grains: the grains after their step; they are only read. NULL: none raise mist.
 /// base: the layer after its step, around which the air flows; it is only read. NULL: there is none.
 /// wind: a grid of velocities (m/s) that the air approaches where there is mist: half of the difference is gone after a tenth of a second.
-///     A component beyond 1000 m/s where there is air is FRZ_ERROR_ARGUMENT. NULL: only frz_mist_params.wind.
+///     Where there is air, a component that is beyond 1000 m/s or not finite is FRZ_ERROR_ARGUMENT. NULL: only frz_mist_params.wind.
 /// bodies: count bodies that bound the air and carry it along; NULL with a count of 0. Bodies that do not move have no positions_end. If
 ///     the openings of a body exceed a tenth of its area, air flows around both of its sides. A body with a vertex that moves faster than
 ///     100 m/s is treated as jumping: it stands at positions_end for the whole step.

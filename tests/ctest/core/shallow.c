@@ -122,7 +122,7 @@ static void flow_points(frz_context *ctx) {
     CHECK(fabs(balance.sourced - moved[0] - moved[1]) < 1e-12 && fabs(balance.drained - moved[2]) < 1e-12);
     CHECK(fabs(balance.absorbed - moved[3]) < 1e-12 && balance.error == 0);
     WORKS(frz_shallow_set_flows(shallow, NULL, 0));
-    FAILS(frz_shallow_flow_moved(shallow, 0, moved), FRZ_ERROR_ARGUMENT, "flow = 0 is out of range: 0 are set");
+    FAILS(frz_shallow_flow_moved(shallow, 0, moved), FRZ_ERROR_ARGUMENT, "flow = 0 is out of range: the count is 0");
     CHECK(moved[0] == 0);
     CHECK(balance_of(shallow).sourced == balance.sourced);
     frz_shallow_destroy(shallow);

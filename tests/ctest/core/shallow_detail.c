@@ -166,7 +166,7 @@ static void dye(frz_context *ctx) {
         CHECK(balance.error == 0);
     }
     CHECK(fabs(balance.sourced - 3 * ML) < 1e-3 * ML && balance.drained > 0.4 * ML);
-    FAILS(frz_shallow_detail_get_scalar_balance(detail, 1, &balance), FRZ_ERROR_ARGUMENT, "scalar = 1 is out of range: 1 are set");
+    FAILS(frz_shallow_detail_get_scalar_balance(detail, 1, &balance), FRZ_ERROR_ARGUMENT, "scalar = 1 is out of range: the count is 1");
     frz_shallow_detail_destroy(detail);
 }
 
@@ -198,7 +198,7 @@ static void words_of_errors(frz_context *ctx) {
     WORKS(frz_shallow_detail_set_params(detail, &params));
     FAILS(frz_shallow_detail_set_near(detail, off), FRZ_ERROR_ARGUMENT, "lie outside of the domain");
     FAILS(frz_shallow_detail_step(ctx, detail, -1, NULL), FRZ_ERROR_ARGUMENT, "a frame of -1 s");
-    FAILS(frz_shallow_detail_flow_moved(detail, 0, &volume), FRZ_ERROR_ARGUMENT, "flow = 0 is out of range: 0 are set");
+    FAILS(frz_shallow_detail_flow_moved(detail, 0, &volume), FRZ_ERROR_ARGUMENT, "flow = 0 is out of range: the count is 0");
     CHECK(volume == 0);
     FAILS(frz_shallow_detail_set_rate(detail, 3, 1), FRZ_ERROR_ARGUMENT, "there is no flow point 3");
     FAILS(frz_shallow_detail_update_terrain(ctx, detail, heights, NULL), FRZ_ERROR_ARGUMENT, "was not made with a mesh");
