@@ -61,7 +61,7 @@ pub struct Flow {
     around: Option<Box<Flow>>,
     /// The operator of the last projection and its preconditioner.
     multigrid: Multigrid,
-    /// The solids of the last projection, until the velocity is advected.
+    /// The solids of the last projection, until [`Flow::prepare_advection`] or [`Flow::resize`].
     solids: Option<Solids>,
     scratch_fields: Scratch,
 }
@@ -195,8 +195,8 @@ impl Flow {
         Ok(solved)
     }
 
-    /// Sets the velocity in and near the solids of the last projection, and in the rim, to what advection reads. [`Flow::advect`] does so
-    /// itself; called before, the largest speed is that of the air that will move.
+    /// Sets the velocity in and near the solids of the last projection, and in the rim, to the values that advection reads. [`Flow::advect`]
+    /// calls this itself. After a call, [`Flow::fastest`] is the largest speed that advection will read.
     pub fn prepare_advection(&mut self) {
         let Some(solids) = self.solids.take() else { return };
         if let Some(around) = &mut self.around {

@@ -1,6 +1,6 @@
 //! Velocities in and near solids, as advection reads them. A wall stops flow through it, not along it: faces just inside continue the
-//! outside flow, so that values carried along a wall are not mixed with the solid's velocity (free slip). Air in a gap much narrower than
-//! a cell moves with the solid.
+//! outside flow, so that values carried along a wall are not mixed with the solid's velocity (free slip). In gaps narrower than
+//! half a cell, air moves more like the solid the narrower the gap is.
 
 use rayon::prelude::*;
 
@@ -10,7 +10,7 @@ use super::tiles::{FACES, Field, NONE, Tile, Tiles};
 
 /// Layers of faces into which the flow is extrapolated.
 const LAYERS: usize = 2;
-/// Open fraction of a face from which air that is advected has its own speed there.
+/// Minimum open fraction of a face for advection to read the air's own speed there.
 const WIDE: f32 = 0.5;
 
 /// The faces of a tile with known velocity, on each axis: bit `y << 3 | z` of word `x`.
@@ -18,9 +18,9 @@ type Known = [[u64; 8]; 3];
 /// All faces.
 const ALL: Known = [[u64::MAX; 8]; 3];
 
-/// Slows air in narrow gaps to the speed of the solid: the less a face is open, the more. The projection balances fluxes, so air that
-/// passes a face open by a twentieth is twenty times as fast as its flux. Carried to open faces with all of that speed, it would gain
-/// energy, in each step again.
+/// Brings the speed of air in narrow gaps closer to that of the solid: the less a face is open, the closer. The projection balances fluxes,
+/// so where a twentieth of a face is open, the air is twenty times as fast as it would be with the same flux through an open face. Carried
+/// to open faces at that speed, it would gain energy in every step.
 pub fn slow_gaps(solids: &Solids, velocity: &mut [Field; 3]) {
     for (axis, field) in velocity.iter_mut().enumerate() {
         field.par_iter_mut().enumerate().with_min_len(64).for_each(|(slot, tile)| {

@@ -113,7 +113,7 @@ impl Shot {
 /// The layer of snow before the first frame, and how it is cut.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snow {
-    /// The ground under the snow. Optional if `layer` is a .vdb file; then only grains lie on it.
+    /// The ground under the snow. Optional if `layer` is a .vdb file; it is then for grains and mist only.
     pub ground: Option<Ground>,
     /// How the layer is given.
     pub layer: Layer,

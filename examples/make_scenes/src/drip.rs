@@ -99,7 +99,7 @@ fn moved(position: DVec3, frame: i32) -> DVec3 {
     let drawn = HALF * (1.0 - 0.94 * smooth(time / (0.85 * contact)));
     let along = ((drawn + middle() - position.y) / (2.0 * drawn)).clamp(0.0, 1.0);
     let share = smooth(along);
-    // Thinner where it is longer, so that the volume stays the same.
+    // Thinner where it is stretched, so that the volume stays the same.
     let thinner = 1.0 / (1.0 + fallen * 6.0 * along * (1.0 - along) / (2.0 * drawn)).sqrt();
     let (x, y, z) = (position.x * thinner, position.y - fallen * share, position.z * thinner);
     // What has come down with the drop spreads.

@@ -43,7 +43,7 @@ fn bowl() -> TriMesh {
     sheet([0.08; 2], [161; 2], |x, z| {
         let from_middle = (x * x + z * z).sqrt();
         let inside = 20.0 * from_middle * from_middle;
-        // Outside of the rim the ground falls a little.
+        // Outside the rim the ground falls a little.
         inside.min(0.0205 - 0.15 * (from_middle - 0.032))
     })
 }

@@ -421,7 +421,7 @@ impl Grains {
         self.heap.trapped()
     }
 
-    /// Grains that removed snow has paid for but that do not exist yet: a sum with fractions.
+    /// Number of grains that removed snow has paid for but that do not exist yet; it may have a fraction.
     pub fn owed(&self) -> f64 {
         // An empty sum is -0.
         self.owed.values().sum::<f64>() + 0.0

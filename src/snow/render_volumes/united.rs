@@ -16,8 +16,8 @@ use crate::vdb::{FloatGrid, Probe};
 /// Maximum voxel size (radii of a grain): spheres with a radius of less than one and a half voxels are lost between the voxels.
 const VOXEL: f64 = 1.0 / 1.5;
 /// Radius with which a grain becomes part of the surface (radii): grains touch only in points, which no grid can represent. Grown by a
-/// quarter, two touching grains share a neck with a radius of 0.75, and a grain a tenth of a diameter above the base is
-/// joined to it.
+/// quarter, two touching grains share a neck whose radius is three quarters of a grain's, and a grain a tenth of a diameter above the base
+/// is joined to it.
 const GROWN: f64 = 1.25;
 /// Half width of the narrow band (voxels).
 const HALF_WIDTH: f32 = 3.0;

@@ -203,7 +203,7 @@ static void concentrations(frz_context *ctx) {
     target.scalars[3] = target.scalars[2], target.scalars[1].data = target.scalars[2].data = NULL;
     FAILS(frz_shallow_surface(ctx, shallow, NULL, &target, NULL), WRONG, "there is no scalar 3 among 3");
     FAILS(frz_shallow_read_scalar(shallow, 3, NO_VIEW, span_of(dye, count)), WRONG, "scalar = 3 is out of range: the count is 3");
-    FAILS(frz_shallow_read_scalar(shallow, 0, view_of(&no_column, 1), span_of(dye, 1)), WRONG, "is out of range");
+    FAILS(frz_shallow_read_scalar(shallow, 0, view_of(&no_column, 1), span_of(dye, 1)), WRONG, "is out of range: there are");
     FAILS(frz_shallow_read_scalar(shallow, 0, NO_VIEW, span_of(dye, 1)), FRZ_ERROR_CAPACITY, "dst: there is room for 1");
     free(columns), free(heat), free(of_vertices), free(depth), free(dye);
     frz_shallow_destroy(shallow);

@@ -8,7 +8,7 @@ use crate::common::liquids::context;
 /// Edge of a cell (m).
 const CELL: f32 = 0.1;
 
-/// A number 0..1 that belongs to a position.
+/// A pseudo-random number 0..1 for a position.
 fn noise(at: [i32; 3], seed: u64) -> f32 {
     let mut state = seed;
     for x in at {

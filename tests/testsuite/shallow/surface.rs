@@ -351,6 +351,8 @@ fn vertices_carry_what_their_columns_do_and_dry_ones_what_is_around() {
     target.carried[2] = Some(&mut short);
     refused(&depths, &mut target, "carried has room for");
     let depths = Depths { carried: [&dye[1..], &[], &[], &[]], ..depths };
-    refused(&depths, &mut Target::default(), "concentrations for");
+    let len = columns.len();
+    let words = format!("{} concentrations for {len} indices: one each is needed", len - 1);
+    refused(&depths, &mut Target::default(), &words);
     assert!(room.iter().all(|number| number.is_nan()));
 }

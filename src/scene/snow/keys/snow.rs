@@ -24,7 +24,7 @@ const STEP: Scopes = &[("base", Scope::Step)];
 /// The keys of snow.
 pub const KEYS: &[Key] = &[
     key(GROUND, "snow", "ground", HeightOrFile(FAR, &EXTENSIONS), optional("0.0").shown()).means(
-        "height of a level plane (m), or a mesh (then no area); if the layer is a .vdb file, only grains lie on it",
+        "height of a level plane (m), or a mesh (then no area); if the layer is a .vdb file, for grains and mist only",
     ),
     key(GROUND, "snow", "area", Numbers(4, FAR, "m"), optional("[-3.0, -3.0, 3.0, 3.0]").shown())
         .means("extent of the plane: x0, z0, x1, z1 (m)"),
