@@ -1891,7 +1891,7 @@ typedef struct {
      */
     uint64_t sources;
     /**
-     * Iterations of all projections together.
+     * Iterations of all projections in the mist's own grid together.
      */
     uint64_t iterations;
     /**

@@ -132,7 +132,8 @@ impl Flow {
         if &self.tiles.coords()[..self.tiles.active()] == active {
             return;
         }
-        self.solids = None;
+        // Solids are known for the old tiles only.
+        self.prepare_advection();
         let old = std::mem::replace(&mut self.tiles, Tiles::new(active));
         let Self { tiles, velocity, density, pressure, scratch_fields, .. } = self;
         let find = |coord: &Coord| old.find(*coord).unwrap_or(tiles::NONE);
@@ -195,8 +196,8 @@ impl Flow {
         Ok(solved)
     }
 
-    /// Sets the velocity in and near the solids of the last projection, and in the rim, to the values that advection reads. [`Flow::advect`]
-    /// calls this itself. After a call, [`Flow::fastest`] is the largest speed that advection will read.
+    /// Sets the velocity in and near the solids of the last projection, and in the rim, to the values that advection reads; a second call has
+    /// no effect. [`Flow::advect`] calls this itself. After a call, [`Flow::fastest`] is the largest speed that advection will read.
     pub fn prepare_advection(&mut self) {
         let Some(solids) = self.solids.take() else { return };
         if let Some(around) = &mut self.around {

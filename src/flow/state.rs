@@ -60,6 +60,7 @@ impl Flow {
 
     /// Restores this flow from `kept`, whose contents are then undefined; only its memory can be reused.
     pub fn restore(&mut self, kept: &mut FlowState) {
+        self.solids = None;
         std::mem::swap(&mut self.tiles, &mut kept.tiles);
         std::mem::swap(&mut self.velocity, &mut kept.velocity);
         std::mem::swap(&mut self.density, &mut kept.density);

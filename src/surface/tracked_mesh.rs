@@ -74,7 +74,7 @@ impl Tracker {
         for (name, old, new) in
             [("spacing", self.params.spacing, params.spacing), ("cell", self.params.cell, params.cell)]
         {
-            fail_if(old != new, || Error::argument(format!("{name} cannot change from {old} to {new}")))?;
+            fail_if(old != new, || Error::argument(format!("{name} = {new} cannot change, it is {old}")))?;
         }
         if self.params.rebuild != params.rebuild {
             return Err(Error::argument("whether the mesh is rebuilt cannot change"));

@@ -35,7 +35,7 @@ pub struct frz_mist_report {
     pub cells: u64,
     /// Grains that raised mist.
     pub sources: u64,
-    /// Iterations of all projections together.
+    /// Iterations of all projections in the mist's own grid together.
     pub iterations: u64,
     /// Sum of the density times the volume of a cell (m3).
     pub mass: f64,

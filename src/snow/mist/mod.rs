@@ -53,7 +53,7 @@ pub struct StepReport {
     pub sources: usize,
     /// Number of sub-steps.
     pub sub_steps: usize,
-    /// Iterations of all pressure projections.
+    /// Iterations of all pressure projections in the mist's own grid.
     pub iterations: usize,
     /// Largest divergence that remained in the mist's own grid after a projection, times the edge of a cell, relative to the largest speed
     /// before that projection.

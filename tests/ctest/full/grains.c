@@ -207,6 +207,11 @@ static void snow_becomes_grains(frz_context *ctx, const ball *rest, const frz_gr
         }
         CHECK(fabs(report.removed_volume - pressed.removed) < 1e-5 * pressed.removed);
         CHECK(report.count == grains_count(straight) && report.sub_steps > 1);
+        /* A step without time reports what there is. */
+        same.struct_size = sizeof same;
+        WORKS(frz_grains_step(ctx, straight, pressed.base, NULL, 0, 0, frame, &same));
+        CHECK(same.count == report.count && same.resting == report.resting && same.born == 0);
+        CHECK(same.trapped == report.trapped && same.owed == report.owed);
         born += (double)report.born, owed = report.owed, paid += 0.5 * report.removed_volume * 0.55;
         /* Two grids. */
         same.struct_size = sizeof same;

@@ -186,7 +186,7 @@ static void refusals(void) {
     FAILS(frz_tracker_create(ctx, &params, mesh, &first, NULL, 0, &none), FRZ_ERROR_ARGUMENT, "weighting = 2");
     params = defaults();
     params.cell = 1;
-    FAILS(frz_tracker_set_params(tracker, &params), FRZ_ERROR_ARGUMENT, "cell cannot change from 0.5 to 1");
+    FAILS(frz_tracker_set_params(tracker, &params), FRZ_ERROR_ARGUMENT, "cell = 1 cannot change, it is 0.5");
     FAILS(frz_tracker_create(ctx, &params, mesh, NULL, state.data, state.size, &none), FRZ_ERROR_FILE, "cell");
     params = defaults();
     params.change = 0.25;

@@ -1,6 +1,6 @@
 //! Walls that cover part of the faces: air between them neither gains energy nor becomes faster without a force.
 
-use frazil::flow::{Faces, Flow, Scheme, Solids, Tiles};
+use frazil::flow::{Faces, Flow, FlowState, Scheme, Solids, Tiles};
 
 use super::fields::{box_of, random_velocity};
 use crate::common::liquids::context;
@@ -70,4 +70,38 @@ fn air_in_narrow_gaps_gains_no_energy() {
             ctx.phase("advect", || flow.advect(&ctx, 0.1, Scheme::Bounded)).unwrap();
         }
     }
+}
+
+#[test]
+fn solids_of_a_projection_do_not_outlive_its_tiles() {
+    let ctx = context(2);
+    let walls = |tiles: &Tiles, cell: f32| Ok(porous(tiles, cell, 1));
+    let mut flow = Flow::new(f64::from(CELL), [0.0; 3]).unwrap();
+    flow.resize(&box_of([0, 0, 0], [1, 1, 1]));
+    random_velocity(&mut flow);
+    let mut kept = FlowState::default();
+    kept.copy_from(&flow);
+    let mut wanted = flow.copy();
+    flow.resize(&box_of([-2, 0, 0], [3, 2, 2]));
+    ctx.phase("project", || flow.project(&ctx, &walls, 1.0e-4)).unwrap();
+    // The state of before has fewer tiles, and no solids.
+    flow.restore(&mut kept);
+    for flow in [&mut flow, &mut wanted] {
+        ctx.phase("advect", || flow.advect(&ctx, 0.1, Scheme::Bounded)).unwrap();
+    }
+    assert!(flow.velocity() == wanted.velocity());
+    // Tiles that are added between projection and advection change nothing of the air that was there.
+    let [small, large] = [false, true].map(|grows| {
+        let mut flow = Flow::new(f64::from(CELL), [0.0; 3]).unwrap();
+        flow.resize(&box_of([0, 0, 0], [3, 3, 3]));
+        random_velocity(&mut flow);
+        ctx.phase("project", || flow.project(&ctx, &walls, 1.0e-4)).unwrap();
+        if grows {
+            flow.resize(&box_of([0, 0, 0], [3, 3, 4]));
+        }
+        ctx.phase("advect", || flow.advect(&ctx, 0.02, Scheme::Bounded)).unwrap();
+        let middle = flow.tiles().find([1, 1, 1]).unwrap() as usize;
+        [0, 1, 2].map(|axis| flow.velocity()[axis][middle])
+    });
+    assert!(small == large);
 }

@@ -32,7 +32,7 @@ const MAX_RATIO: f64 = 2.0;
 pub struct Inputs {
     /// The mesh at the first frame that has particles (m), with the data that it carries.
     pub mesh: Arc<DetailedMesh>,
-    /// Detail retention of each vertex: the share that never fades; empty: none.
+    /// Detail retention of each vertex, 0 (fades as the parameters say) to 1 (never fades); empty: 0 everywhere.
     pub(super) detail_retention: Vec<f32>,
     /// Initial distance between particles (m).
     pub spacing: f64,

@@ -20,7 +20,7 @@ pub struct Sculpt {
     pub path: PathBuf,
     /// The mesh (m), with the same arrays as the mesh of the first frame, in the same order.
     pub mesh: DetailedMesh,
-    /// Detail retention of each vertex: the share that never fades; empty: none.
+    /// Detail retention of each vertex, 0 (fades as the parameters say) to 1 (never fades); empty: 0 everywhere.
     pub detail_retention: Vec<f32>,
     /// Warnings about data that it lacks, or that is ignored.
     warnings: Vec<String>,
