@@ -254,7 +254,7 @@ pub const GATES: &[Gate] = &[
     gate("snow.mist.flux", "1", Most(1.0e-3), Open),
     yes("snow.mist.pocket"),
     // Air around a character that walks through snow: its largest speed relative to the character's, in all frames and in nine of ten.
-    gate("snow.mist.jets", "x", Most(30.0), Most(10.0)),
+    gate("snow.mist.jets", "x", Most(15.0), Most(8.0)),
     gate("snow.mist.jets_p90", "x", Most(3.0), Most(2.0)),
     // A pass of all stages: its files from 1 and 2 threads, at other CPU levels and after kills; mist leaves other stages alone.
     yes("snow.mist.same_bytes"),

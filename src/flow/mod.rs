@@ -61,7 +61,7 @@ pub struct Flow {
     around: Option<Box<Flow>>,
     /// The operator of the last projection and its preconditioner.
     multigrid: Multigrid,
-    /// The solids of the last projection, until [`Flow::prepare_advection`] or [`Flow::resize`].
+    /// The solids of the last projection, until [`Flow::prepare_advection`].
     solids: Option<Solids>,
     scratch_fields: Scratch,
 }
