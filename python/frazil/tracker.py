@@ -76,7 +76,8 @@ class Tracker(Handle):
         first = None if particles is None else c.byref(particles._desc())
         super().__init__(made("tracker_create", ctx.pointer, c.byref(params), mesh.pointer, first, state,
                               len(state) if state else 0))
-        self._ctx, self._spacing, self._rebuild = ctx, spacing, more.get("rebuild", False)
+        self._ctx, self._spacing = ctx, spacing
+        self._fixed = {"rebuild": more.get("rebuild", False), "cell": params.cell}
 
     def _words(self):
         return f"of {len(self)} vertices on particles {self._spacing:g} m apart"
@@ -100,9 +101,9 @@ class Tracker(Handle):
         return params
 
     def set_params(self, **more):
-        """Sets how the mesh follows from the next step on. Parameters not given take their defaults. spacing and rebuild stay;
-        cell must be the one that the tracker was created with."""
-        params = self._params(self._spacing, **{"rebuild": self._rebuild} | more)
+        """Sets how the mesh follows from the next step on. Parameters not given take their defaults, but spacing, cell and rebuild
+        stay as they are."""
+        params = self._params(self._spacing, **self._fixed | more)
         call("tracker_set_params", self.pointer, c.byref(params))
 
     def step(self, before, after, dt):

@@ -407,6 +407,8 @@ class Tracker(unittest.TestCase):
         self.assertEqual(tracker.read("flagged").sum(), 0)
         self.assertTrue((np.abs(tracker.read("delta")) < 0.2).all())
         tracker.set_params(weighting="mean", change=0.25)
+        fine = frazil.Tracker(ctx, mesh, first, spacing=0.1, cell=0.4)
+        fine.set_params(half_life=0.5)
         with self.assertRaisesRegex(frazil.Error, "cell = 1 cannot change, it is 0.5"):
             tracker.set_params(cell=1.0)
         with self.assertRaisesRegex(TypeError, "no parameter gravitation"):

@@ -78,7 +78,8 @@ impl From<Error> for Failure {
             Error::Memory { .. } | Error::OutOfMemory => FRZ_ERROR_MEMORY,
             Error::Cancelled => FRZ_CANCELLED,
             Error::OpenVdb(_) => FRZ_ERROR_OPENVDB,
-            Error::Internal(_) => FRZ_ERROR_INTERNAL,
+            // A bug, like a panic: it must unwind through the handles in use, which this poisons.
+            Error::Internal(what) => std::panic::panic_any(what.clone()),
         };
         Self::new(status, error.to_string())
     }

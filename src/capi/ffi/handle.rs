@@ -282,8 +282,10 @@ impl<T> Drop for Changing<'_, T> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::guard::guard;
+    use super::super::guard::{guard, last_error};
     use super::*;
+    use crate::error::{Error, Result};
+    use std::ffi::CStr;
 
     struct Jar;
     struct Tin;
@@ -365,18 +367,24 @@ mod tests {
     }
 
     #[test]
-    fn a_handle_that_saw_a_panic_is_poisoned_and_can_be_destroyed() {
-        let jar = jar(7);
-        // SAFETY: the jar lives until it is destroyed.
-        unsafe {
-            let status = guard(|| {
-                let _changing = change(jar)?;
-                panic!("on purpose")
-            });
-            assert_eq!(status, FRZ_ERROR_INTERNAL);
-            assert_eq!(change(jar).err().unwrap().status, FRZ_ERROR_POISONED);
-            assert_eq!(read(jar.cast_const()).err().unwrap().status, FRZ_ERROR_POISONED);
-            assert!(destroy(jar).is_ok());
+    fn a_handle_that_saw_a_bug_is_poisoned_and_can_be_destroyed() {
+        let bugs: [fn() -> Result<()>; 2] =
+            [|| panic!("on purpose"), || Err(Error::Internal("on purpose".into()))];
+        for bug in bugs {
+            let jar = jar(7);
+            // SAFETY: the jar lives until it is destroyed.
+            unsafe {
+                let status = guard(|| {
+                    let _changing = change(jar)?;
+                    Ok(bug()?)
+                });
+                assert_eq!(status, FRZ_ERROR_INTERNAL);
+                let message = CStr::from_ptr(last_error());
+                assert_eq!(message.to_str().unwrap(), "internal error: on purpose");
+                assert_eq!(change(jar).err().unwrap().status, FRZ_ERROR_POISONED);
+                assert_eq!(read(jar.cast_const()).err().unwrap().status, FRZ_ERROR_POISONED);
+                assert!(destroy(jar).is_ok());
+            }
         }
     }
 }
