@@ -26,7 +26,7 @@ pub struct ShotArgs {
     /// Write only these frames; earlier frames are computed if no file has them.
     #[arg(long, value_name = "A-B|A-BxN|A,B,C", allow_hyphen_values = true)]
     pub frames: Option<FrameChoice>,
-    /// Keep the frames before N, whatever they were made with, and make all others of these stages again.
+    /// Keep the frames before N, whatever settings they were made with, and make those from N on again, in the stages that run.
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     pub from: Option<i32>,
     /// Override a setting of the scene, for instance snow.noise.seed=2 or object.1.file=hero.glb.

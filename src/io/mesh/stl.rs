@@ -47,7 +47,7 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<(PolygonMes
     }
     let more = bytes.len() - length;
     let warning = (more > 0)
-        .then(|| format!("{more} bytes behind the {count} triangles that its header names are not read"));
+        .then(|| format!("{more} bytes after the {count} triangles that its header declares are not read"));
     Ok((joined.mesh, warning))
 }
 

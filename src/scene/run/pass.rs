@@ -123,7 +123,7 @@ impl<'a, S: Stepping> StagePass<'a, S> {
         let latest = done.latest_state(first..=frame - 1);
         if own_from > first && latest.is_none_or(|latest| latest < own_from - 1) {
             let what = format!(
-                "the {} after frame {}, from which these settings resume, is gone: choose another -o, or --from {first}",
+                "the state of the {} after frame {}, from which the frames with the present settings continue, is gone: choose another -o, or --from {first}",
                 stage.noun(),
                 own_from - 1
             );

@@ -23,7 +23,7 @@ pub(in crate::scene) fn changed(before: &Settings, after: &Settings) -> Vec<Stri
     let keys: BTreeSet<&String> = before.keys().chain(after.keys()).collect();
     let differs = |key: &&&String| before.get(**key) != after.get(**key);
     let described = |key: &String| match (before.get(key), override_key(key)) {
-        (Some(value), key) if value.starts_with(CONTENT) => format!("{key} had another content"),
+        (Some(value), key) if value.starts_with(CONTENT) => format!("{key} had different contents"),
         (Some(value), key) if key == "shot.frames" => format!("{key} began at {value}"),
         (Some(value), key) if value.len() > MAX_LENGTH => key,
         (Some(value), key) => format!("{key} was {value}"),
@@ -109,6 +109,6 @@ mod tests {
         assert_eq!(changed(&before, &after), ["object.2.up was \"z\"", "snow.depth was 0.3"]);
         let file =
             |content: &str| BTreeMap::from([("object[1].file".to_string(), format!("{CONTENT}{content}"))]);
-        assert_eq!(changed(&file("a"), &file("b")), ["object.1.file had another content"]);
+        assert_eq!(changed(&file("a"), &file("b")), ["object.1.file had different contents"]);
     }
 }

@@ -110,9 +110,9 @@ pub const TABLE_ARRAY_KEYS: &[Key] = &[
     key(FIRST, "scalar", "start", Number(-1.0e9, 1.0e9, ""), or("0.0"))
         .means("concentration in liquid from `fill`, and in pours and sources whose `carries` does not name it"),
     key(STEP, "scalar", "stains", Flag, or("false"))
-        .means("for one scalar, if shallow.stains is true; true: it stains by its concentration / range, and clear liquid washes stains off; without such a scalar any liquid stains"),
+        .means("for at most one scalar, and only if shallow.stains is true; true: it stains by its concentration / range, and clear liquid washes stains off; without such a scalar any liquid stains"),
     key(STEP, "scalar", "thickens_times", Number(1.0e-6, 1.0e9, ""), optional("5.0"))
-        .means("for one scalar: factor of the liquid's viscosity from the concentration `thickens_to` on; 1 up to `thickens_from`, and linear between them"),
+        .means("for at most one scalar: factor of the liquid's viscosity from the concentration `thickens_to` on; the factor is 1 up to `thickens_from`, and linear in between"),
     key(STEP, "scalar", "thickens_from", Number(-1.0e9, 1.0e9, ""), or("0.0"))
         .means("concentration up to which the viscosity is unchanged, within the range"),
     key(STEP, "scalar", "thickens_to", Number(-1.0e9, 1.0e9, ""), optional("1.0"))

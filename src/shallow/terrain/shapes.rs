@@ -55,7 +55,9 @@ impl Shape {
             return Err(Error::argument(format!("an obstacle at ({x}, {y}, {z}) is not finite")));
         }
         if let Some(length) = lengths.iter().find(|length| !(**length > 0.0 && length.is_finite())) {
-            return Err(Error::argument(format!("an obstacle's {length} m is not a positive length")));
+            return Err(Error::argument(format!(
+                "an obstacle has a length of {length} m: it must be positive and finite"
+            )));
         }
         if let Self::Cuboid { axes: [a, b, c], .. } = self {
             let skew = [a.dot(a) - 1.0, b.dot(b) - 1.0, c.dot(c) - 1.0, a.dot(b), b.dot(c), c.dot(a)];
@@ -314,7 +316,7 @@ mod tests {
         let ends = [DVec3::zeros(), DVec3::x()];
         assert_eq!(
             message(Shape::Capsule { ends, radius: 0.0 }),
-            "an obstacle's 0 m is not a positive length"
+            "an obstacle has a length of 0 m: it must be positive and finite"
         );
         let axes = [DVec3::x(), DVec3::y(), DVec3::y()];
         let skewed = Shape::Cuboid { centre: DVec3::zeros(), axes, half: [1.0; 3] };

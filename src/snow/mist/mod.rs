@@ -250,7 +250,7 @@ impl Mist {
         ensure(
             count <= MAX_SUB_STEPS as f64,
             format_args!(
-                "mist moves at {speed:.0} m/s, more than {MAX_SUB_STEPS} steps of {FARTHEST} cells of {} m in {dt:.4} s",
+                "mist moves at {speed:.0} m/s: in {dt:.4} s it passes more than {MAX_SUB_STEPS} times {FARTHEST} cells of {} m",
                 self.params.cell
             ),
         )?;

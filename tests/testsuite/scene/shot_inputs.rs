@@ -97,8 +97,8 @@ fn a_static_object_is_part_of_the_layer_that_from_keeps() {
     let before = output(&folder.join("out"));
     for (set, word) in [
         ("object.1.scale=0.5", "static object 1: scale was 1.0"),
-        ("object.1.file=cube.obj", "static object 1: file had another content"),
-        ("object.1.role=ignore", "static object 1: file had another content"),
+        ("object.1.file=cube.obj", "static object 1: file had different contents"),
+        ("object.1.role=ignore", "static object 1: file had different contents"),
         ("object.2.role=static", "static object 2: file was not set"),
     ] {
         let run = format!("snow shot.toml -o out --from 3 --set {set}");

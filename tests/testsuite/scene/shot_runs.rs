@@ -164,7 +164,7 @@ fn a_mesh_that_changed_is_noticed_wherever_it_lies() {
     fs::rename(folder.join("cube.obj"), folder.join("moved/box.obj")).unwrap();
     works(&folder, "snow shot.toml -o out -q --set object.1.file=moved/box.obj");
     fs::write(folder.join("cube.obj"), CUBE.replace(".4", ".5")).unwrap();
-    fails(&folder, "snow shot.toml -o out", 2, &["object.1.file had another content"]);
+    fails(&folder, "snow shot.toml -o out", 2, &["object.1.file had different contents"]);
 }
 
 #[test]

@@ -15,7 +15,7 @@ const OTHERS: [(&str, &str); 10] = [
     ("--set snow.noise.seed=3", "snow.noise.seed was 0"),
     ("--set object.1.scale=0.9", "object.1.scale was 1.0"),
     ("--set object.1.role=base", "object.1.role was \"collide\""),
-    ("--set object.1.file=other.obj", "object.1.file had another content"),
+    ("--set object.1.file=other.obj", "object.1.file had different contents"),
     ("--set shot.fps=25", "shot.fps was 24.0"),
     ("--preview 2", "snow.cell was 0.02"),
 ];

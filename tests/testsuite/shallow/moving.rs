@@ -490,6 +490,6 @@ fn bad_terrain_is_a_sentence() {
     assert_eq!(beyond, "cells 3..21 x 0..4 are not a box within 20 x 10 cells");
     let body = Shape::Sphere { centre: DVec3::zeros(), radius: f64::NAN };
     let body = shallow.set_bodies(&[body]).unwrap_err().to_string();
-    assert_eq!(body, "an obstacle's NaN m is not a positive length");
+    assert_eq!(body, "an obstacle has a length of NaN m: it must be positive and finite");
     assert_eq!(shallow.balance(), before);
 }
