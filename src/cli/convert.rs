@@ -144,10 +144,10 @@ pub fn prim_name(input: &Path) -> String {
 /// Refuses an output file of a type that cannot hold a mesh.
 pub fn check_output(path: &Path) -> Result<(), Failure> {
     let extension = extension(path);
-    if extension == "usda" || io::mesh::EXTENSIONS.contains(&extension.as_str()) {
+    if usd::Format::of(&extension).is_some() || io::mesh::EXTENSIONS.contains(&extension.as_str()) {
         return Ok(());
     }
-    Err(Failure::of_file(path, "the output must be a .obj, .ply, .stl or .usda file"))
+    Err(Failure::of_file(path, "the output must be a .obj, .ply, .stl, .usda or .usdc file"))
 }
 
 /// A file to be written with one mesh.
@@ -171,19 +171,19 @@ impl MeshFile<'_> {
         velocities: impl FnOnce(Option<Vec<Vec3>>) -> frazil::Result<Vec<Vec3>>,
     ) -> frazil::Result<()> {
         let mut written: Vec<&MeshArray> = arrays.iter().collect();
-        if extension(self.path) != "usda" {
+        let Some(format) = usd::Format::of(&extension(self.path)) else {
             let carried = io::mesh::Carried { uvs, arrays: &written, ..Default::default() };
             return io::mesh::write_carried(self.path, mesh, &carried);
-        }
+        };
         let found = vectors(arrays, VELOCITY);
         if found.is_some() {
             written.retain(|array| array.on != On::Vertices || !VELOCITY.contains(&&*array.name));
         }
         let velocities = velocities(found)?;
         let carried = io::mesh::Carried { velocities: &velocities, uvs, arrays: &written };
-        let mesh = usd::MeshFrame::of(self.name, mesh, &carried);
-        let text = usd::clip("meshes", self.frame, self.fps, self.units, &[mesh]);
-        atomic::write_bytes(self.path, text.as_bytes())
+        let mesh = usd::MeshFrame::of(self.name, mesh, &carried, usd::Shading::Creased);
+        let bytes = usd::clip("meshes", self.frame, self.fps, self.units, &[mesh]).bytes(format)?;
+        atomic::write_bytes(self.path, &bytes)
     }
 }
 
@@ -203,10 +203,11 @@ impl Losses<'_> {
         let mut lost = if is_gltf(input) { Character::extras(input)? } else { io::mesh::extras::of(input)? };
         let uvs = uvs.filter(|_| io::mesh::holds_uvs(self.output));
         let to = extension(self.output);
+        let is_usd = usd::Format::of(&to).is_some();
         lost.retain(|name| match *name {
             "UVs" => uvs.is_none(),
-            "colours" => !["ply", "obj", "usda"].contains(&to.as_str()),
-            "velocities" => !["ply", "usda"].contains(&to.as_str()) || !self.keeps_space,
+            "colours" => !["ply", "obj"].contains(&to.as_str()) && !is_usd,
+            "velocities" => (to != "ply" && !is_usd) || !self.keeps_space,
             _ => true,
         });
         if let Some(missing) = uvs.map(|uvs| uvs.missing).filter(|missing| *missing > 0) {

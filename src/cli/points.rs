@@ -9,7 +9,7 @@ use frazil::io::files::sequence::Pattern;
 use frazil::io::mesh::extension;
 use frazil::io::particles::ply;
 use frazil::io::particles::{self, ParticleData};
-use frazil::io::usd::points;
+use frazil::io::usd::{Format, points};
 use frazil::motion::Space;
 use frazil::scene::FrameChoice;
 use frazil::{Error, Result};
@@ -71,7 +71,7 @@ pub fn converts_points(input: &Path, output: &Path, frames: Option<&FrameChoice>
     if [input, output].into_iter().any(is_point_file) {
         return Ok(true);
     }
-    if extension(input) != "ply" || !["ply", "usda"].contains(&extension(output).as_str()) {
+    if extension(input) != "ply" || (extension(output) != "ply" && Format::of(&extension(output)).is_none()) {
         return Ok(false);
     }
     let first = match (Pattern::parse(input), frames) {
@@ -110,9 +110,9 @@ impl Conversion<'_> {
     /// Converts every frame.
     pub fn run(&self, session: &Session) -> std::result::Result<(), Failure> {
         let is_sequence = Pattern::parse(self.input).is_some();
-        let is_written = ["vdb", "usda"].contains(&extension(self.output).as_str());
+        let is_written = extension(self.output) == "vdb" || Format::of(&extension(self.output)).is_some();
         if !is_written && !particles::can_write(self.output) {
-            let what = "the output for points must be a .vdb, .ply, .usda, .bgeo or .xyz file";
+            let what = "the output for points must be a .vdb, .ply, .usda, .usdc, .bgeo or .xyz file";
             return Err(Failure::of_file(self.output, what));
         }
         if extension(self.input) != "vdb" && !particles::has_extension_of_particles(self.input) {
@@ -179,10 +179,11 @@ impl Conversion<'_> {
             }
             #[cfg(not(feature = "vdb"))]
             "vdb" => super::needs_openvdb(path),
-            "usda" => {
+            usd if Format::of(usd).is_some() => {
+                let format = Format::of(usd).unwrap_or(Format::Text);
                 let stem = self.input.file_stem().unwrap_or_default().to_string_lossy().into_owned();
                 let name = stem.split(['%', '#', '$', '.']).next().unwrap_or_default();
-                atomic::write_bytes(path, points::frame(name, frame, self.fps, points).as_bytes())
+                atomic::write_bytes(path, &points::frame(name, frame, self.fps, points).bytes(format)?)
             }
             _ => particles::write(path, points, *has_voxels),
         }

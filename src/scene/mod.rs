@@ -252,7 +252,7 @@ pub struct Output {
     pub grains_vdb: bool,
     /// `grains/grains.%04d.ply`.
     pub grains_ply: bool,
-    /// `grains/grains.%04d.usda`.
+    /// `grains/grains.%04d.usdc`.
     pub grains_usd: bool,
     /// Whether the grains' .vdb files hold only the changes since the previous frame, except every 24th.
     pub grains_delta: bool,
@@ -260,7 +260,7 @@ pub struct Output {
     pub mist: bool,
     /// Volumes to render.
     pub volumes: VolumesOutput,
-    /// `objects/objects.%04d.usda`: the moving objects, with velocities.
+    /// `objects/objects.%04d.usdc`: the moving objects, with velocities.
     pub objects_usd: bool,
     /// `objects/objects.%04d.ply`: the same, all in one mesh.
     pub objects_ply: bool,
@@ -281,7 +281,7 @@ pub struct VolumesOutput {
     pub snow: bool,
     /// `mesh/mesh.%04d.ply`: the surface of the base.
     pub mesh_ply: bool,
-    /// `mesh/mesh.%04d.usda`: the surface of the base.
+    /// `mesh/mesh.%04d.usdc`: the surface of the base.
     pub mesh_usd: bool,
 }
 

@@ -12,7 +12,7 @@ use crate::geometry::{DVec3, TriMesh, Uvs, Vec3};
 use crate::io::records::input_hashes::InputHashes;
 use crate::io::records::manifest::Keeps;
 use crate::io::usd::materials::Look;
-use crate::io::usd::{ClipPrims, Clips, MeshPrim};
+use crate::io::usd::{ClipPrims, Clips, MeshPrim, Shading};
 use crate::io::{mesh, usd};
 use crate::motion::Drawn;
 use crate::scene::run::settings::settings_of;
@@ -51,7 +51,7 @@ impl<'a> Objects<'a> {
     }
 
     /// A value clip with a mesh for each object.
-    fn usda(&self, poses: &Poses, drawn: &[Drawn<'_>]) -> String {
+    fn usd(&self, poses: &Poses, drawn: &[Drawn<'_>]) -> usd::File {
         let frames = poses.meshes.iter().zip(drawn.iter().zip(&self.names));
         let frames: Vec<usd::MeshFrame> = frames
             .map(|((points, velocities), (drawn, name))| usd::MeshFrame {
@@ -61,9 +61,11 @@ impl<'a> Objects<'a> {
                 triangles: drawn.triangles,
                 uvs: drawn.uvs,
                 arrays: &[],
+                shading: Shading::Creased,
             })
             .collect();
-        usd::clip("objects", poses.frame, self.scene.shot.fps, usd::Units::OWN, &frames)
+        let (fps, units) = (self.scene.shot.fps, usd::Units::OWN);
+        usd::clip("objects", poses.frame, fps, units, &frames)
     }
 }
 
@@ -73,7 +75,7 @@ impl Stage for Objects<'_> {
     }
 
     fn kinds(&self) -> &'static [FileKind] {
-        &[FileKind { name: "objects", extensions: &["usda", "ply"] }]
+        &[FileKind { name: "objects", extensions: &["usdc", "usda", "ply"] }]
     }
 
     fn usd_kind(&self) -> Option<&'static str> {
@@ -99,8 +101,14 @@ impl Stage for Objects<'_> {
     fn clip(&self) -> Option<Clips<'_>> {
         let uvs = self.bodies.iter().map(|body| body.motion().drawn().uvs);
         let named = self.names.iter().cloned().zip(uvs);
-        let mesh =
-            |(name, uvs)| MeshPrim { name, look: Look::Object, moves: true, uvs, primvars: Vec::new() };
+        let mesh = |(name, uvs)| MeshPrim {
+            name,
+            look: Look::Object,
+            moves: true,
+            uvs,
+            primvars: Vec::new(),
+            shading: Shading::Creased,
+        };
         Some(Clips::new("objects", ClipPrims::Meshes(named.map(mesh).collect())))
     }
 }
@@ -144,7 +152,7 @@ impl Stepping for Objects<'_> {
             files.save("objects", "ply", &self.ply(&poses, &drawn))?;
         }
         if self.scene.output.objects_usd {
-            files.save("objects", "usda", self.usda(&poses, &drawn).as_bytes())?;
+            files.save_usd("objects", self.usd(&poses, &drawn))?;
         }
         Ok(())
     }

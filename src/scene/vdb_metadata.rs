@@ -1,7 +1,9 @@
-//! Metadata of .vdb files about their frame.
+//! Metadata of .vdb files about their frame, and what their grids hold.
 
 use super::Scene;
-use crate::vdb::MetaValue;
+use crate::geometry::DVec3;
+use crate::io::usd::Contents;
+use crate::vdb::{FloatGrid, MetaValue};
 
 /// Metadata of every .vdb file of a shot.
 pub(super) fn metadata(scene: &Scene, frame: i32, made_from: &str) -> Vec<(String, MetaValue)> {
@@ -16,4 +18,20 @@ pub(super) fn metadata(scene: &Scene, frame: i32, made_from: &str) -> Vec<(Strin
         ("frazil:version".into(), text(env!("CARGO_PKG_VERSION"))),
         ("frazil:inputs".into(), text(made_from)),
     ]
+}
+
+/// What grids hold, by their names, for the frame's report and `shot.usda`.
+pub(super) fn contents(grids: &[&FloatGrid]) -> Vec<(String, Contents)> {
+    let of = |grid: &&FloatGrid| (grid.name(), Contents { extent: extent(grid), ..Contents::default() });
+    grids.iter().map(of).collect()
+}
+
+/// Minimum and maximum corner of a box around the active voxels, whose edges are parallel to the axes (m).
+fn extent(grid: &FloatGrid) -> Option<[[f32; 3]; 2]> {
+    let (low, high) = grid.active_bbox()?;
+    let corner = |voxel: [i32; 3], by: f64| {
+        let index = DVec3::from(voxel.map(f64::from)).add_scalar(by);
+        grid.index_to_world(index).cast::<f32>().into()
+    };
+    Some([corner(low, -0.5), corner(high, 0.5)])
 }

@@ -28,7 +28,7 @@ ids = list(points.GetIdsAttr().Get(frame))
 places, velocities = points.GetPointsAttr().Get(frame), points.GetVelocitiesAttr().Get(frame)
 widths = list(points.GetWidthsAttr().Get(frame))
 active, source_frame, rest = (primvars.GetPrimvar(name).Get(frame) for name in ("active", "source_frame", "rest"))
-assert points.GetWidthsInterpolation() == UsdGeom.Tokens.constant and len(widths) == 1, widths
+assert points.GetWidthsInterpolation() == UsdGeom.Tokens.vertex and len(widths) == len(ids)
 assert len(ids) == len(places) == len(velocities) == len(active) == len(source_frame) == len(rest) == len(records)
 order = sorted(range(len(ids)), key=ids.__getitem__)
 for at, record in zip(order, records):
@@ -36,6 +36,6 @@ for at, record in zip(order, records):
     assert tuple(places[at]) == single(record[1:4]), (tuple(places[at]), record[1:4])
     assert tuple(velocities[at]) == record[4:7]
     assert tuple(rest[at]) == record[7:10]
-    assert widths[0] == 2 * record[10]
+    assert widths[at] == 2 * record[10]
     assert (source_frame[at], active[at]) == record[11:13]
 print(f"frazil: {len(ids)} grains")

@@ -56,17 +56,18 @@ grains = UsdGeom.Points(stage.GetPrimAtPath("/shot/grains"))
 counts = []
 if grains:
     assert grains.GetPurposeAttr().Get() == UsdGeom.Tokens.render
-    assert grains.GetWidthsInterpolation() == UsdGeom.Tokens.constant
+    assert grains.GetWidthsInterpolation() == UsdGeom.Tokens.vertex
     primvars = UsdGeom.PrimvarsAPI(grains)
     for frame in range(first, last + 1):
         ids, places, velocities = (
             attribute.Get(frame) for attribute in (grains.GetIdsAttr(), grains.GetPointsAttr(), grains.GetVelocitiesAttr())
         )
         assert len(ids) == len(places) == len(velocities) and list(ids) == sorted(set(ids))
-        (width,) = grains.GetWidthsAttr().Get(frame)
-        file = Usd.Stage.Open(str(folder / "grains" / f"grains.{frame:04d}.usda"))
+        widths = grains.GetWidthsAttr().Get(frame)
+        file = Usd.Stage.Open(str(folder / "grains" / f"grains.{frame:04d}.usdc"))
         alone = UsdGeom.Points(file.GetDefaultPrim())
-        assert places == alone.GetPointsAttr().Get(frame) and ids == alone.GetIdsAttr().Get(frame) and width > 0
+        assert places == alone.GetPointsAttr().Get(frame) and ids == alone.GetIdsAttr().Get(frame)
+        assert len(widths) == len(ids) and all(width == widths[0] > 0 for width in widths)
         for name in ("active", "trapped", "source_frame", "rest"):
             primvar = primvars.GetPrimvar(name)
             assert primvar.GetInterpolation() == UsdGeom.Tokens.vertex and len(primvar.Get(frame)) == len(ids), name

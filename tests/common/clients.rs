@@ -86,6 +86,18 @@ pub fn usd_composes(python: &Path, folder: &Path, first: i32, last: i32) -> Resu
     run(command)
 }
 
+/// A Python with usd-core and the validators of NVIDIA, if there is one.
+pub fn validators() -> Option<PathBuf> {
+    python_that_runs("from pxr import UsdValidation; import usd_validation_nvidia")
+}
+
+/// usd-core and its validators, and NVIDIA's, find no error in a shot, and find in it all that the reports of its frames list.
+pub fn usd_is_whole(python: &Path, folder: &Path) -> Result<String, String> {
+    let mut command = Command::new(python);
+    command.arg(root().join("tests/clients/contents.py")).arg(folder);
+    run(command)
+}
+
 /// usd-core reads the arrays of a mesh at a frame and finds those of a file that tests/clients/primvars.py describes.
 pub fn usd_reads_arrays(
     python: &Path,

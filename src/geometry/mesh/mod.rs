@@ -1,6 +1,7 @@
 //! Triangle meshes.
 
 pub mod attributes;
+pub mod normals;
 pub mod polygons;
 pub mod uvs;
 pub mod weld;
@@ -68,13 +69,7 @@ impl TriMesh {
 
     /// Unit normals of the vertices: means over the triangles around, weighted by area; zero where there is none.
     pub fn normals(&self) -> Vec<Vec3> {
-        let mut sums = vec![DVec3::zeros(); self.positions.len()];
-        for (triangle, corners) in self.triangles.iter().enumerate() {
-            let doubled = normal(&self.corners(triangle));
-            corners.iter().for_each(|&corner| sums[corner as usize] += doubled);
-        }
-        let unit = |sum: &DVec3| sum.try_normalize(0.0).unwrap_or_default().cast();
-        sums.iter().map(unit).collect()
+        normals::smooth(&self.positions, &self.triangles)
     }
 
     /// Enclosed volume by the divergence theorem (m3); exact for a closed mesh.

@@ -140,7 +140,7 @@ pub fn write_carried(path: &Path, mesh: &TriMesh, carried: &Carried<'_>) -> Resu
 
 /// Whether a file of this name can hold texture coordinates.
 pub fn holds_uvs(path: &Path) -> bool {
-    matches!(extension(path).as_str(), "obj" | "ply" | "usda")
+    matches!(extension(path).as_str(), "obj" | "ply" | "usda" | "usdc" | "usd")
 }
 
 /// The bytes of a .ply file.

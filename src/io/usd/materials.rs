@@ -1,6 +1,6 @@
 //! Materials of a USD stage: what renderers show of a shot before it has been shaded.
 
-use std::fmt::Write;
+use super::layer::{Attribute, Prim, Value};
 
 /// Material of a prim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -25,7 +25,7 @@ pub enum Look {
 /// Scope that holds the materials.
 const SCOPE: &str = "materials";
 /// Roughness of a wet surface.
-const WET: f64 = 0.05;
+const WET: f32 = 0.05;
 
 impl Look {
     /// Name of its material.
@@ -41,12 +41,12 @@ impl Look {
         }
     }
 
-    /// The API schema that a prim with a material needs, as an entry of its metadata (in parentheses after its name).
-    pub(in crate::io) const SCHEMA: &'static str = "prepend apiSchemas = [\"MaterialBindingAPI\"]";
+    /// The API schema that a prim with a material needs.
+    pub(in crate::io) const SCHEMA: &'static str = "MaterialBindingAPI";
 
     /// Binds a material to a prim.
-    pub(in crate::io) fn bind(self, out: &mut String, indent: &str) {
-        let _ = writeln!(out, "{indent}rel material:binding = </shot/{SCOPE}/{}>", self.name());
+    pub(in crate::io) fn bind(self, prim: &mut Prim) {
+        prim.relate("material:binding", format!("/shot/{SCOPE}/{}", self.name()));
     }
 
     /// Whether its opacity is that of the mesh.
@@ -54,58 +54,60 @@ impl Look {
         matches!(self, Self::Water | Self::Blood | Self::Paint | Self::Honey)
     }
 
-    /// The source of the shader's opacity, and the shader that reads it.
-    fn opacity(self) -> (String, String) {
+    fn define(self) -> Prim {
         let name = self.name();
-        let input = format!(
-            "float inputs:opacity.connect = </shot/{SCOPE}/{name}/opacity.outputs:result>\n                "
-        );
-        let reader = "\n            def Shader \"opacity\"\n            {\n                \
-                      uniform token info:id = \"UsdPrimvarReader_float\"\n                \
-                      float inputs:fallback = 1\n                string inputs:varname = \"displayOpacity\"\n                \
-                      float outputs:result\n            }\n";
-        (input, reader.into())
-    }
-
-    fn define(self, out: &mut String) {
-        let name = self.name();
+        let path = format!("/shot/{SCOPE}/{name}");
+        let mut material = Prim::def("Material", name);
         // Fresh snow reflects nine tenths of the light, blue a little more than red; its grains scatter forward.
         let (colour, roughness) = match self {
-            Self::Snow => ("(0.9, 0.92, 0.95)", 0.75),
-            Self::Object => ("(0.32, 0.33, 0.36)", 0.5),
-            Self::Water => ("(0.05, 0.25, 0.3)", WET),
-            Self::Blood => ("(0.3, 0.008, 0.006)", WET),
-            Self::Paint => ("(0.05, 0.2, 0.6)", 0.3),
-            Self::Honey => ("(0.75, 0.36, 0.03)", WET),
+            Self::Snow => ([0.9, 0.92, 0.95], 0.75),
+            Self::Object => ([0.32, 0.33, 0.36], 0.5),
+            Self::Water => ([0.05, 0.25, 0.3], WET),
+            Self::Blood => ([0.3, 0.008, 0.006], WET),
+            Self::Paint => ([0.05, 0.2, 0.6], 0.3),
+            Self::Honey => ([0.75, 0.36, 0.03], WET),
             Self::Fog => {
-                let _ = write!(
-                    out,
-                    "        def Material \"{name}\"\n        {{\n            color3f inputs:albedo = (0.98, 0.985, 0.99)\n            \
-                     float inputs:anisotropy = 0.3\n        }}\n"
-                );
-                return;
+                let albedo = Value::Vector([0.98, 0.985, 0.99]);
+                material.add(Attribute::new("color3f", "inputs:albedo").with(albedo));
+                material.add(Attribute::new("float", "inputs:anisotropy").with(Value::Float(0.3)));
+                return material;
             }
         };
-        let (opacity, reader) = if self.is_liquid() { self.opacity() } else { Default::default() };
-        let _ = write!(
-            out,
-            "        def Material \"{name}\"\n        {{\n            \
-             token outputs:surface.connect = </shot/{SCOPE}/{name}/surface.outputs:surface>\n\n            \
-             def Shader \"surface\"\n            {{\n                uniform token info:id = \"UsdPreviewSurface\"\n                \
-             color3f inputs:diffuseColor = {colour}\n                float inputs:roughness = {roughness}\n                \
-             {opacity}token outputs:surface\n            }}\n{reader}        }}\n"
+        material.add(
+            Attribute::new("token", "outputs:surface").connected(format!("{path}/surface.outputs:surface")),
         );
+        let mut surface = shader("surface", "UsdPreviewSurface");
+        surface.add(Attribute::new("color3f", "inputs:diffuseColor").with(Value::Vector(colour)));
+        surface.add(Attribute::new("float", "inputs:roughness").with(Value::Float(roughness)));
+        if self.is_liquid() {
+            let opacity = format!("{path}/opacity.outputs:result");
+            surface.add(Attribute::new("float", "inputs:opacity").connected(opacity));
+        }
+        surface.add(Attribute::new("token", "outputs:surface"));
+        material.children.push(surface);
+        if self.is_liquid() {
+            let mut reader = shader("opacity", "UsdPrimvarReader_float");
+            reader.add(Attribute::new("float", "inputs:fallback").with(Value::Float(1.0)));
+            reader.add(Attribute::new("string", "inputs:varname").with(Value::Text("displayOpacity".into())));
+            reader.add(Attribute::new("float", "outputs:result"));
+            material.children.push(reader);
+        }
+        material
     }
 }
 
-/// Defines the materials of some prims, each once.
-pub(in crate::io) fn define(out: &mut String, mut looks: Vec<Look>) {
+/// A shader of a type that USD defines.
+fn shader(name: &str, id: &str) -> Prim {
+    let mut prim = Prim::def("Shader", name);
+    prim.add(Attribute::token("info:id", id));
+    prim
+}
+
+/// The materials of some prims, each once; none without any.
+pub(in crate::io) fn scope(mut looks: Vec<Look>) -> Option<Prim> {
     looks.sort_unstable();
     looks.dedup();
-    if looks.is_empty() {
-        return;
-    }
-    let _ = write!(out, "    def Scope \"{SCOPE}\"\n    {{\n");
-    looks.into_iter().for_each(|look| look.define(out));
-    out.push_str("    }\n");
+    let mut scope = Prim::def("Scope", SCOPE);
+    scope.children = looks.into_iter().map(Look::define).collect();
+    (!scope.children.is_empty()).then_some(scope)
 }

@@ -1,20 +1,28 @@
-//! Arrays of a mesh as USD text: one primvar for each, or for three that are the components of a vector or of a colour.
+//! Arrays of a mesh in USD: one primvar for each, or for three that are the components of a vector or of a colour.
 //!
 //! `red`, `green` and `blue`, or `Cdx`, `Cdy` and `Cdz` (Houdini's `Cd`), become `displayColor`, USD's name for the colours of a mesh, and
 //! `alpha` becomes `displayOpacity`: with the values of the file, bytes divided by 255. `NAMEx`, `NAMEy` and `NAMEz` become the vector
 //! `NAME`.
 
-use std::fmt::Write;
-
-use super::{list, prim_name};
+use super::layer::{Attribute, Value};
+use super::prim_name;
 use crate::geometry::mesh::attributes::{MeshArray, Number, On};
 
-/// A primvar without its values: its name and its interpolation.
+/// A primvar without its values.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Primvar {
-    /// Type and name: `float[] primvars:mask`.
-    declared: String,
+    /// Type: `float[]`.
+    class: &'static str,
+    /// Name, with its namespace: `primvars:mask`.
+    name: String,
     interpolation: &'static str,
+}
+
+impl Primvar {
+    /// Its attribute, without a value.
+    pub(in crate::io) fn attribute(&self) -> Attribute {
+        Attribute::new(self.class, &*self.name).interpolated(self.interpolation)
+    }
 }
 
 /// The primvars of a mesh with these arrays, whose values do not matter.
@@ -22,36 +30,11 @@ pub fn primvars(arrays: &[&MeshArray]) -> Vec<Primvar> {
     grouped(arrays).into_iter().map(|group| group.primvar).collect()
 }
 
-/// Declares the interpolation of primvars whose values are elsewhere.
-pub(in crate::io) fn declare(out: &mut String, indent: &str, primvars: &[Primvar]) {
-    for Primvar { declared, interpolation } in primvars {
-        let _ =
-            write!(out, "{indent}{declared} (\n{indent}    interpolation = \"{interpolation}\"\n{indent})\n");
-    }
-}
-
-/// Writes the primvars of one frame; arrays of corners have three values for each triangle.
-pub(in crate::io) fn write(out: &mut String, indent: &str, frame: i32, arrays: &[&MeshArray]) {
-    for Group { primvar, parts, is_fraction } in grouped(arrays) {
-        declare(out, indent, std::slice::from_ref(&primvar));
-        let number = |out: &mut String, array: &MeshArray, at: usize| {
-            if is_fraction { fraction(out, array, at) } else { number(out, array.number, array.values[at]) }
-        };
-        let count = parts.iter().map(|part| part.values.len()).min().unwrap_or(0);
-        let values = list(0..count, |out, at| match parts[..] {
-            [x, y, z] => {
-                let mut before = "(";
-                for part in [x, y, z] {
-                    out.push_str(before);
-                    number(out, part, at);
-                    before = ", ";
-                }
-                out.push(')');
-            }
-            _ => parts.iter().for_each(|part| number(out, part, at)),
-        });
-        let _ = writeln!(out, "{indent}{}.timeSamples = {{ {frame}: {values} }}", primvar.declared);
-    }
+/// The primvars of a mesh at a frame, without the values of the faces that are not in `faces`. Arrays of corners have three values for
+/// each triangle.
+pub(in crate::io) fn attributes(arrays: &[&MeshArray], faces: Faces<'_>, frame: i32) -> Vec<Attribute> {
+    let attribute = |group: Group<'_>| group.primvar.attribute().at(frame, group.values(faces));
+    grouped(arrays).into_iter().map(attribute).collect()
 }
 
 /// A primvar with the arrays that it is made of: one or three.
@@ -60,6 +43,56 @@ struct Group<'a> {
     parts: Vec<&'a MeshArray>,
     /// Whether its values are fractions of 1, which files may store as bytes.
     is_fraction: bool,
+}
+
+impl Group<'_> {
+    fn values(&self, faces: Faces<'_>) -> Value {
+        let part = |array: &MeshArray| -> Vec<f64> {
+            let whole = if self.is_fraction && array.number == Number::U8 { 255.0 } else { 1.0 };
+            let fraction =
+                |value: f64| if self.is_fraction { f64::from(value as f32 / whole) } else { value };
+            let values = array.values.iter().map(|value| fraction(*value));
+            match (array.on, faces) {
+                (On::Vertices, _) | (_, Faces::All) => values.collect(),
+                (On::Faces, Faces::Only(kept)) => {
+                    kept.iter().map(|face| fraction(array.values[*face])).collect()
+                }
+                (On::Corners, Faces::Only(kept)) => {
+                    let corners = kept.iter().flat_map(|face| [3 * face, 3 * face + 1, 3 * face + 2]);
+                    corners.map(|corner| fraction(array.values[corner])).collect()
+                }
+            }
+        };
+        let parts: Vec<Vec<f64>> = self.parts.iter().map(|array| part(array)).collect();
+        match &parts[..] {
+            [x, y, z] => {
+                let vectors = x.iter().zip(y).zip(z).map(|((x, y), z)| [*x, *y, *z]);
+                match self.primvar.class {
+                    "double3[]" => Value::DoubleVectors(vectors.collect()),
+                    "int3[]" => {
+                        Value::IntVectors(vectors.map(|parts| parts.map(|part| part as i32)).collect())
+                    }
+                    _ => Value::Vectors(vectors.map(|parts| parts.map(|part| part as f32)).collect()),
+                }
+            }
+            parts => {
+                let values = parts.iter().flatten();
+                match self.primvar.class {
+                    "double[]" => Value::Doubles(values.copied().collect()),
+                    "uint[]" => Value::Uints(values.map(|value| *value as u32).collect()),
+                    "int[]" => Value::Ints(values.map(|value| *value as i32).collect()),
+                    _ => Value::Floats(values.map(|value| *value as f32).collect()),
+                }
+            }
+        }
+    }
+}
+
+/// Which faces of a mesh are written.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::io) enum Faces<'a> {
+    All,
+    Only(&'a [usize]),
 }
 
 /// The primvar planned for some arrays.
@@ -88,16 +121,16 @@ const TAKEN: [&str; 5] = [COLOUR, "points", "normals", "velocities", "accelerati
 fn grouped<'a>(arrays: &[&'a MeshArray]) -> Vec<Group<'a>> {
     let mut out = Vec::new();
     let mut written = vec![false; arrays.len()];
-    // Texture coordinates already use this name.
-    let mut taken = vec!["st".to_string()];
+    // Texture coordinates and normals have these names.
+    let mut taken = vec!["st".to_string(), "normals".to_string()];
     for (at, array) in arrays.iter().enumerate() {
         if written[at] {
             continue;
         }
         let draft = vector_at(arrays, &written, at).unwrap_or_else(|| single(array, at));
         draft.members.iter().for_each(|member| written[*member] = true);
-        let declared = format!("{}[] primvars:{}", draft.class, unique(draft.name, &mut taken));
-        let primvar = Primvar { declared, interpolation: interpolation(array.on) };
+        let name = format!("primvars:{}", unique(draft.name, &mut taken));
+        let primvar = Primvar { class: draft.class, name, interpolation: interpolation(array.on) };
         let parts = draft.members.iter().map(|member| arrays[*member]).collect();
         out.push(Group { primvar, parts, is_fraction: draft.is_fraction });
     }
@@ -108,7 +141,7 @@ fn grouped<'a>(arrays: &[&'a MeshArray]) -> Vec<Group<'a>> {
 fn single(array: &MeshArray, at: usize) -> Draft {
     let members = vec![at];
     if array.name == "alpha" && can_be_colours(array.number) {
-        return Draft { name: OPACITY.into(), class: "float", members, is_fraction: true };
+        return Draft { name: OPACITY.into(), class: "float[]", members, is_fraction: true };
     }
     let mut name = prim_name(&array.name);
     if TAKEN.contains(&name.as_str()) {
@@ -122,7 +155,7 @@ fn vector_at(arrays: &[&MeshArray], written: &[bool], at: usize) -> Option<Draft
     let array = arrays[at];
     let Vector { parts, name, is_colour } = vector_of(&array.name)?;
     let class = match is_colour {
-        true => can_be_colours(array.number).then_some("color3f"),
+        true => can_be_colours(array.number).then_some("color3f[]"),
         false => triple(array.number),
     }?;
     let members: Option<Vec<usize>> = parts
@@ -179,46 +212,22 @@ fn can_be_colours(number: Number) -> bool {
 
 fn scalar(number: Number) -> &'static str {
     match number {
-        Number::F32 => "float",
-        Number::F64 => "double",
-        Number::U32 => "uint",
+        Number::F32 => "float[]",
+        Number::F64 => "double[]",
+        Number::U32 => "uint[]",
         // Few programs read smaller types.
-        Number::I8 | Number::U8 | Number::I16 | Number::U16 | Number::I32 => "int",
+        Number::I8 | Number::U8 | Number::I16 | Number::U16 | Number::I32 => "int[]",
     }
 }
 
 /// The type of a vector; USD has no vectors of unsigned integers.
 fn triple(number: Number) -> Option<&'static str> {
     match number {
-        Number::F32 => Some("float3"),
-        Number::F64 => Some("double3"),
+        Number::F32 => Some("float3[]"),
+        Number::F64 => Some("double3[]"),
         Number::U32 => None,
-        Number::I8 | Number::U8 | Number::I16 | Number::U16 | Number::I32 => Some("int3"),
+        Number::I8 | Number::U8 | Number::I16 | Number::U16 | Number::I32 => Some("int3[]"),
     }
-}
-
-/// Floats from this value on are written with an exponent.
-const EXPONENT_FROM: f64 = 1e16;
-
-/// Writes a number in USD's syntax.
-pub(in crate::io) fn number(out: &mut String, number: Number, value: f64) {
-    let _ = match number {
-        // USD accepts NaN only in lower case, and takes long numbers without an exponent for integers.
-        _ if value.is_nan() => write!(out, "nan"),
-        Number::F32 if value.abs() >= EXPONENT_FROM => write!(out, "{:e}", value as f32),
-        Number::F64 if value.abs() >= EXPONENT_FROM => write!(out, "{value:e}"),
-        Number::F32 => write!(out, "{}", value as f32),
-        Number::F64 => write!(out, "{value}"),
-        Number::I8 | Number::U8 | Number::I16 | Number::U16 | Number::I32 | Number::U32 => {
-            write!(out, "{}", value as i64)
-        }
-    };
-}
-
-/// Writes a value as a fraction of 1.
-fn fraction(out: &mut String, array: &MeshArray, at: usize) {
-    let whole = if array.number == Number::U8 { 255.0 } else { 1.0 };
-    number(out, Number::F32, f64::from(array.values[at] as f32 / whole));
 }
 
 #[cfg(test)]
@@ -231,7 +240,10 @@ mod tests {
 
     fn declared(arrays: &[MeshArray]) -> Vec<String> {
         let arrays: Vec<&MeshArray> = arrays.iter().collect();
-        primvars(&arrays).into_iter().map(|one| format!("{} {}", one.declared, one.interpolation)).collect()
+        primvars(&arrays)
+            .into_iter()
+            .map(|one| format!("{} {} {}", one.class, one.name, one.interpolation))
+            .collect()
     }
 
     #[test]
@@ -296,21 +308,28 @@ mod tests {
     fn values_are_those_of_the_arrays() {
         let arrays = [
             array("delta", On::Vertices, Number::F32, &[0.1f32.into(), f64::NAN, f64::NEG_INFINITY]),
-            array("id", On::Faces, Number::U32, &[4_294_967_295.0]),
-            array("far", On::Faces, Number::F64, &[-1e300]),
+            array("id", On::Faces, Number::U32, &[4_294_967_295.0, 7.0]),
+            array("far", On::Faces, Number::F64, &[-1e300, 0.5]),
             array("red", On::Vertices, Number::U8, &[255.0, 0.0, 51.0]),
             array("green", On::Vertices, Number::U8, &[0.0, 0.0, 51.0]),
             array("blue", On::Vertices, Number::U8, &[0.0, 255.0, 51.0]),
         ];
-        let mut out = String::new();
-        write(&mut out, "", 7, &arrays.iter().collect::<Vec<_>>());
-        let lines: Vec<&str> = out.lines().filter(|line| line.contains("timeSamples")).collect();
-        let want = [
-            "float[] primvars:delta.timeSamples = { 7: [0.1, nan, -inf] }",
-            "uint[] primvars:id.timeSamples = { 7: [4294967295] }",
-            "double[] primvars:far.timeSamples = { 7: [-1e300] }",
-            "color3f[] primvars:displayColor.timeSamples = { 7: [(1, 0, 0), (0, 0, 1), (0.2, 0.2, 0.2)] }",
-        ];
-        assert_eq!(lines, want);
+        let arrays: Vec<&MeshArray> = arrays.iter().collect();
+        let values = |faces| -> Vec<Value> {
+            attributes(&arrays, faces, 7)
+                .into_iter()
+                .flat_map(|one| one.samples)
+                .map(|(_, value)| value)
+                .collect()
+        };
+        let [Value::Floats(delta), rest @ ..] = &values(Faces::All)[..] else { panic!() };
+        assert!(delta[0] == 0.1 && delta[1].is_nan() && delta[2] == f32::NEG_INFINITY, "{delta:?}");
+        let colours = Value::Vectors(vec![[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.2, 0.2, 0.2]]);
+        assert_eq!(
+            rest,
+            [Value::Uints(vec![u32::MAX, 7]), Value::Doubles(vec![-1e300, 0.5]), colours.clone()]
+        );
+        let [_, rest @ ..] = &values(Faces::Only(&[1]))[..] else { panic!() };
+        assert_eq!(rest, [Value::Uints(vec![7]), Value::Doubles(vec![0.5]), colours]);
     }
 }

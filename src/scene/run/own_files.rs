@@ -11,6 +11,7 @@ use super::stage::Stage;
 use crate::error::{Error, Result};
 use crate::io::files::{atomic, hash};
 use crate::io::records::checksummed;
+use crate::io::usd;
 use crate::scene::FrameChoice;
 
 /// The scene with its defaults.
@@ -110,8 +111,9 @@ impl OwnFiles {
         }
         if scene.output.usd {
             self.refuse_changed(SHOT_USD, None)?;
+            self.refuse_changed(usd::SAMPLES, None)?;
             let kinds = pipeline.stages().filter_map(|stage| stage.usd_kind());
-            kinds.map(usd_manifest).try_for_each(|name| self.refuse_changed(&name, None))?;
+            kinds.map(usd::manifest_path).try_for_each(|name| self.refuse_changed(&name, None))?;
         }
         self.refuse_changed(SCENE, Some(&new))?;
         let requested = frames.first()..=frames.last();
@@ -218,7 +220,7 @@ impl OwnFiles {
     /// Whether runs write files of this name into a folder.
     fn is_own(&self, folder: &str, name: &str) -> bool {
         let is_shot_file = match folder {
-            "" => [SCENE, SHOT_USD].contains(&name),
+            "" => [SCENE, SHOT_USD, usd::SAMPLES].contains(&name),
             "state" => name == FILES || name.strip_suffix(".json").is_some_and(|name| self.has_stage(name)),
             kind => self.known.files.contains_key(&format!("{kind}/{name}")),
         };
@@ -321,11 +323,6 @@ pub(super) struct FrameFile {
 fn is_same(a: &Path, b: &Path) -> bool {
     let canonical = |path| std::fs::canonicalize(path).ok();
     canonical(a).is_some_and(|a| canonical(b) == Some(a))
-}
-
-/// Path of the manifest that the .usda files of a kind share.
-pub(in crate::scene::run) fn usd_manifest(kind: &str) -> String {
-    format!("{kind}/{kind}.manifest.usda")
 }
 
 /// Name of the file that describes the shot to programs that read USD.

@@ -5,12 +5,13 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
 
-use serde_json::json;
+use serde_json::{Map, Value, json};
 
 use super::cache::Cache;
 use super::chain::FrameHashes;
 use super::done_frames::{DoneFrames, Resumable};
 use super::stage::{FrameFiles, Report, Stage, StepTarget, Stepped, Stepping};
+use super::usd::CONTENTS;
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
 use crate::io::files::atomic;
@@ -244,8 +245,8 @@ impl<S: Stepping> FrameWriter<'_, S> {
         };
         let mut files = FrameFiles::new(self.folder, self.stage, frame, &hashes.inputs);
         self.stage.write(writer, step, Some(&mut files))?;
-        let (files, state) = files.into_written();
-        self.write_report(frame, &report)?;
+        let (files, state, contents) = files.into_written();
+        self.write_report(frame, &report, contents)?;
         let keeps = self.stage.keeps(frame);
         let manifest = Manifest { frame, inputs: hashes.inputs, keeps, files, state, next: hashes.next };
         manifest.write(self.folder, self.stage.name())?;
@@ -264,13 +265,16 @@ impl<S: Stepping> FrameWriter<'_, S> {
         while passed.next().is_some_and(|old| std::fs::remove_file(path(old)).is_ok()) {}
     }
 
-    fn write_report(&self, frame: i32, report: &Report) -> Result<()> {
+    fn write_report(&self, frame: i32, report: &Report, contents: Map<String, Value>) -> Result<()> {
         let time = |time: &PhaseTime| json!({ "name": time.name, "seconds": time.time.as_secs_f64() });
         let mut text = report.results.clone();
         text.insert("check".into(), checksummed::UNSTAMPED.into());
+        if !contents.is_empty() {
+            text.insert(CONTENTS.into(), contents.into());
+        }
         text.insert("frame".into(), frame.into());
         text.insert("phases".into(), report.phases.iter().map(time).collect());
-        let text = serde_json::Value::Object(text);
+        let text = Value::Object(text);
         let path = self.folder.join("report").join(format!("{}.{frame:04}.json", self.stage.name()));
         atomic::write_bytes(&path, checksummed::stamp(&format!("{text:#}\n")).as_bytes())
     }

@@ -60,7 +60,7 @@ pub trait Stage: Sync {
         "vdb"
     }
 
-    /// The kind of its .usda files, if this scene has them. They share a manifest, which belongs to no single frame.
+    /// The kind of its USD files, if this scene has them. They share a manifest, which belongs to no single frame.
     fn usd_kind(&self) -> Option<&'static str> {
         None
     }
@@ -226,13 +226,16 @@ pub struct FrameFiles<'a> {
     pub made_from: &'a str,
     files: Vec<Written>,
     state: Option<Written>,
+    /// What the files hold, for the report: by kind, then by name of the prim or grid.
+    contents: Map<String, Value>,
 }
 
 impl<'a> FrameFiles<'a> {
     /// No files yet, for a frame of a stage.
     pub(super) fn new(folder: &'a Path, stage: &dyn Stage, frame: i32, made_from: &'a str) -> Self {
         let (stage, state_extension) = (stage.name(), stage.state_extension());
-        Self { folder, stage, state_extension, frame, made_from, files: Vec::new(), state: None }
+        let (files, contents) = (Vec::new(), Map::new());
+        Self { folder, stage, state_extension, frame, made_from, files, state: None, contents }
     }
 
     /// Writes a file of a kind atomically.
@@ -246,7 +249,7 @@ impl<'a> FrameFiles<'a> {
         Ok(())
     }
 
-    /// Writes the .usda file of a kind, with one mesh, at `fps` frames per second.
+    /// Writes the USD file of a kind, with one mesh, at `fps` frames per second.
     ///
     /// # Errors
     /// What the operating system reports.
@@ -257,9 +260,31 @@ impl<'a> FrameFiles<'a> {
         mesh: &TriMesh,
         carried: &Carried<'_>,
     ) -> Result<()> {
-        let mesh = usd::MeshFrame::of(kind, mesh, carried);
-        let text = usd::clip(kind, self.frame, fps, usd::Units::OWN, &[mesh]);
-        self.save(kind, "usda", text.as_bytes())
+        let mesh = usd::MeshFrame::of(kind, mesh, carried, usd::Shading::Smooth);
+        self.save_usd(kind, usd::clip(kind, self.frame, fps, usd::Units::OWN, &[mesh]))
+    }
+
+    /// Writes a USD file of a kind.
+    ///
+    /// # Errors
+    /// What the operating system reports.
+    pub(in crate::scene) fn save_usd(&mut self, kind: &str, file: usd::File) -> Result<()> {
+        self.describe(kind, file.contents());
+        self.save(kind, usd::BINARY, &file.bytes(usd::Format::Binary)?)
+    }
+
+    /// Notes what the files of a kind hold, by name of the prim or grid, for the frame's report.
+    pub(in crate::scene) fn describe(&mut self, kind: &str, contents: &[(String, usd::Contents)]) {
+        let of_kind = self.contents.entry(kind).or_insert_with(|| Map::new().into());
+        let Value::Object(of_kind) = of_kind else { unreachable!("an object was inserted") };
+        for (name, usd::Contents { points, faces, extent }) in contents {
+            let mut entry = Map::new();
+            for (count, name) in [(points, "points"), (faces, "faces")] {
+                count.iter().for_each(|count| _ = entry.insert(name.into(), (*count).into()));
+            }
+            entry.insert("extent_m".into(), serde_json::json!(extent));
+            of_kind.insert(name.clone(), entry.into());
+        }
     }
 
     /// Writes the exact state after the frame atomically.
@@ -273,9 +298,9 @@ impl<'a> FrameFiles<'a> {
         Ok(())
     }
 
-    /// The files that were written, and the exact state.
-    pub(super) fn into_written(self) -> (Vec<Written>, Option<Written>) {
-        (self.files, self.state)
+    /// The files that were written, the exact state, and what the files hold.
+    pub(super) fn into_written(self) -> (Vec<Written>, Option<Written>, Map<String, Value>) {
+        (self.files, self.state, self.contents)
     }
 }
 

@@ -1,11 +1,17 @@
 //! `shot.usda`: the whole shot for programs that read USD.
 
+use std::path::Path;
+
 use super::done_frames::DoneFrames;
-use super::own_files::{OwnFiles, SHOT_USD, usd_manifest};
+use super::own_files::{OwnFiles, SHOT_USD};
 use super::pipeline::Pipeline;
 use super::stage::{Stage, Volume};
 use crate::error::Result;
-use crate::io::usd::{self, Clips, VolumeFiles};
+use crate::io::mesh::extension;
+use crate::io::usd::{self, Clips, Field, Holds, VolumeFile, VolumeFiles};
+
+/// Key of a frame's report: what its files hold, by kind, then by name of the prim or grid.
+pub(super) const CONTENTS: &str = "contents";
 
 /// Writes the description of the existing frames, with relative paths.
 ///
@@ -23,20 +29,51 @@ pub(super) fn write<'s>(
     };
     let (mut volumes, mut clips): (Vec<VolumeFiles>, Vec<Clips>) = (Vec::new(), Vec::new());
     for (stage, stored) in stages {
-        volumes.extend(stage.volumes().into_iter().map(|Volume { kind, prim: name, fields, is_guide }| {
-            VolumeFiles { name, fields, is_guide, files: relative(stored, kind) }
-        }));
+        for Volume { kind, prim: name, fields, is_guide } in stage.volumes() {
+            let of_frame = |(frame, path)| volume_file(stored, (kind, fields), frame, path);
+            let files: Vec<VolumeFile> =
+                relative(stored, kind).into_iter().map(of_frame).collect::<Result<_>>()?;
+            volumes.extend(
+                Some(VolumeFiles { name, fields, is_guide, files }).filter(|one| !one.files.is_empty()),
+            );
+        }
         let Some(mut clip) = stage.clip() else { continue };
-        let files = relative(stored, clip.kind).into_iter().filter(|(_, file)| file.ends_with(".usda"));
-        clip.frames.extend(files.map(|(frame, _)| frame));
-        clips.extend(Some(clip).filter(|clip| !clip.frames.is_empty()));
+        let is_usd = |file: &String| usd::Format::of(&extension(Path::new(file))).is_some();
+        clip.files.extend(relative(stored, clip.kind).into_iter().filter(|(_, file)| is_usd(file)));
+        clips.extend(Some(clip).filter(|clip| !clip.files.is_empty()));
     }
     for Clips { kind, prims, .. } in &clips {
-        let manifest = usd::clip_manifest(kind, prims);
-        files.write(&usd_manifest(kind), manifest.as_bytes())?;
+        files.write(&usd::manifest_path(kind), &usd::clip_manifest(kind, prims)?)?;
+    }
+    if !volumes.is_empty() {
+        files.write(usd::SAMPLES, &usd::samples(&volumes)?)?;
     }
     let time = usd::StageTime { first: frames.first, last: frames.last, fps };
     let comment = format!("made by frazil {}", env!("CARGO_PKG_VERSION"));
-    let text = usd::stage(&comment, time, &volumes, &clips);
-    files.write(SHOT_USD, text.as_bytes())
+    files.write(SHOT_USD, &usd::stage(&comment, time, &volumes, &clips)?)
+}
+
+/// A file of a volume, whose extent is in the frame's report; reports of frazil 0.1 have none.
+fn volume_file(
+    stored: &DoneFrames,
+    (kind, fields): (&str, &[Field]),
+    frame: i32,
+    path: String,
+) -> Result<VolumeFile> {
+    type Box = [[f32; 3]; 2];
+    let report = stored.report(frame)?.unwrap_or_default();
+    let grids = report.get(CONTENTS).and_then(|contents| contents.get(kind));
+    let visible = fields.iter().filter(|field| matches!(field.holds, Holds::Distance | Holds::Density(_)));
+    let extent = |field: &Field| grids?.get(field.grid)?.get("extent_m").cloned();
+    let known: Vec<serde_json::Value> = visible.filter_map(extent).collect();
+    let boxes = known.iter().filter_map(|extent| serde_json::from_value::<Box>(extent.clone()).ok());
+    let joined = boxes.reduce(|[low, high], [l, h]| {
+        [0, 1].map(|end| {
+            [0, 1, 2].map(|axis| match end {
+                0 => low[axis].min(l[axis]),
+                _ => high[axis].max(h[axis]),
+            })
+        })
+    });
+    Ok(VolumeFile { frame, path, is_empty: joined.is_none() && !known.is_empty(), extent: joined })
 }

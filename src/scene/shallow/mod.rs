@@ -148,7 +148,7 @@ pub enum ObstacleShape {
 pub struct OutputFiles {
     /// `liquid/liquid.%04d.ply`.
     pub ply: bool,
-    /// `liquid/liquid.%04d.usda`.
+    /// `liquid/liquid.%04d.usdc`.
     pub usd: bool,
     /// `volume/volume.%04d.vdb`.
     pub vdb: bool,

@@ -75,7 +75,7 @@ pub struct Files {
     pub ply: bool,
     /// `surface/surface.%04d.obj`.
     pub obj: bool,
-    /// `surface/surface.%04d.usda`.
+    /// `surface/surface.%04d.usdc`.
     pub usd: bool,
     /// The arrays of velocities over the coming frame.
     pub velocities: bool,

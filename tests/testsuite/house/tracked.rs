@@ -7,8 +7,9 @@ use std::process::Command;
 /// Folders and endings of what cargo, make, cmake, Python and mcs write.
 const FOLDERS: [&str; 8] =
     ["target", "__pycache__", "dist", "build", "CMakeFiles", "node_modules", ".pytest_cache", "egg-info"];
-const ENDINGS: [&str; 14] =
-    ["pyc", "pyo", "o", "a", "so", "dll", "dylib", "exe", "rlib", "rmeta", "whl", "deb", "vdb", "usda"];
+const ENDINGS: [&str; 15] = [
+    "pyc", "pyo", "o", "a", "so", "dll", "dylib", "exe", "rlib", "rmeta", "whl", "deb", "vdb", "usda", "usdc",
+];
 
 fn git(arguments: &[&str]) -> Option<String> {
     let output =

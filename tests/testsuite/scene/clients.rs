@@ -64,6 +64,17 @@ fn usd_core_composes_the_stage_with_velocities_and_files() {
 }
 
 #[test]
+fn validators_find_no_error_in_a_shot_with_all_its_parts() {
+    let Some(python) = clients::validators() else { return skipped("no usd-validation-nvidia") };
+    let mist =
+        VOLUMES.replace("[output]", "[mist]\n[output]").replace("\"base\", \"grains\"", "\"base\", \"mist\"");
+    let folder = shot(&mist);
+    let said = clients::usd_is_whole(&python, &folder.join("out")).unwrap();
+    // Of six frames: base, removed, grains, mist, two densities of fog, snow, mesh and the box.
+    assert!(said.starts_with("54 parts"), "{said}");
+}
+
+#[test]
 fn usd_core_composes_grains_and_volumes_with_materials() {
     let Some(python) = clients::usd_python() else { return skipped("no usd-core") };
     let folder = shot(VOLUMES);

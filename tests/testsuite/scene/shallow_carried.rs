@@ -9,6 +9,7 @@ use serde_json::Value;
 
 use super::shallow_shot::{are_same, report};
 use crate::common::shapes::squares;
+use crate::common::usda;
 use crate::program::{Folder, command, kill_at, works};
 
 /// A floor, and a shelf over the half of it with the lesser x, 5 cm higher.
@@ -89,7 +90,7 @@ fn what_falls_and_what_it_carries_add_up_and_are_in_the_mesh() {
     // The rim takes what is around: a film of milk on the shelf is white to its edge.
     let on_shelf = (0..count).filter(|&at| falling[at] == 0.0 && liquid.mesh.positions[at].y > 0.05);
     assert!(on_shelf.clone().count() > 50 && on_shelf.clone().all(|at| milk[at] > 0.3));
-    let usda = fs::read_to_string(folder.join("out/liquid/liquid.0030.usda")).unwrap();
+    let usda = usda::text(&folder.join("out/liquid/liquid.0030.usdc"));
     for name in ["primvars:falling", "primvars:milk", "primvars:heat"] {
         assert!(usda.contains(name), "{name}");
     }

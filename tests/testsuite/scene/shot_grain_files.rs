@@ -14,6 +14,7 @@ use frazil::{Context, Pool};
 use super::shot_grains::{folder, grains};
 use crate::common::bodies::Dice;
 use crate::common::character;
+use crate::common::usda;
 use crate::program::{Folder, fails, frazil, works};
 
 /// The bytes of a file of grains apart from settings, all paths from folder `at`.
@@ -377,7 +378,7 @@ fn shot_usda_has_the_grains_that_have_usd_files() {
         "uniform token purpose = \"render\"",
         "int64[] ids\n",
         "vector3f[] velocities\n",
-        "float[] widths (\n            interpolation = \"constant\"",
+        "float[] widths (\n            interpolation = \"vertex\"",
         "bool[] primvars:trapped (\n            interpolation = \"vertex\"",
     ] {
         assert!(stage.contains(words), "no {words:?} in {stage}");
@@ -385,12 +386,11 @@ fn shot_usda_has_the_grains_that_have_usd_files() {
     // All that a frame has is declared, and each frame has it in the same way.
     let manifest = fs::read_to_string(at.join("out/grains/grains.manifest.usda")).unwrap();
     for frame in [1, 10] {
-        let text = fs::read_to_string(at.join(format!("out/grains/grains.{frame:04}.usda"))).unwrap();
-        let names: Vec<&str> =
-            text.lines().filter_map(|line| Some(line.split_once(".timeSamples")?.0)).collect();
-        assert_eq!(names.len(), 9, "{text}");
+        let text = usda::text(&at.join(format!("out/grains/grains.{frame:04}.usdc")));
+        let names = usda::sampled(&text);
+        assert_eq!(names.len(), 10, "{text}");
         names.iter().for_each(|name| assert!(manifest.contains(name), "no {name} in {manifest}"));
-        assert_eq!(text.matches("\"constant\"").count(), 1, "frame {frame}");
+        assert_eq!(text.matches("\"constant\"").count(), 0, "frame {frame}");
     }
     assert!(works(at, "check out").contains("all of them are as they were written"));
     // Volumes hold no points.

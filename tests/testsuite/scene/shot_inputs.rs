@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::character::output;
+use crate::common::usda;
 use crate::program::{CUBE, Folder, complains, fails, frazil, works};
 
 /// A folder with a cube; the scene has an area of 2 x 2 m, and `objects` at its end.
@@ -30,11 +31,9 @@ fn cube_at(x: f64) -> String {
     CUBE.lines().map(moved).collect()
 }
 
-/// The first velocity along x in an .usda file.
+/// The first velocity along x in a USD file.
 fn velocity(path: &Path) -> f64 {
-    let clip = fs::read_to_string(path).unwrap();
-    let numbers = clip.split("velocities.timeSamples = {").nth(1).unwrap().split("[(").nth(1).unwrap();
-    numbers.split(',').next().unwrap().parse().unwrap()
+    usda::numbers(&usda::text(path), "velocities")[0].into()
 }
 
 const SEQUENCE: &str = "[output]\nobjects = [\"usd\"]\n[[object]]\nfile = \"body.%04d.obj\"\n";
@@ -46,7 +45,7 @@ fn the_last_frame_of_a_sequence_moves_as_the_next_file_says_once_it_is_there() {
         |frame: i32, x: f64| fs::write(folder.join(format!("body.{frame:04}.obj")), cube_at(x)).unwrap();
     (1..=4).for_each(|frame| write(frame, 0.01 * f64::from(frame * frame)));
     works(&folder, "snow shot.toml -o out -q");
-    let last = folder.join("out/objects/objects.0004.usda");
+    let last = folder.join("out/objects/objects.0004.usdc");
     // No next file: as over the frame before, 0.16 - 0.09 m in 1/24 s.
     assert!((velocity(&last) - 0.07 * 24.0).abs() < 1e-4, "{}", velocity(&last));
     let said = works(&folder, "snow shot.toml -o out");
@@ -56,7 +55,7 @@ fn the_last_frame_of_a_sequence_moves_as_the_next_file_says_once_it_is_there() {
     works(&folder, "snow shot.toml -o out -q");
     assert!((velocity(&last) - 0.09 * 24.0).abs() < 1e-4, "{}", velocity(&last));
     // Frame 5 is the last of the shot, but not of the files.
-    let last = folder.join("out/objects/objects.0005.usda");
+    let last = folder.join("out/objects/objects.0005.usdc");
     assert!((velocity(&last) - 0.11 * 24.0).abs() < 1e-4, "{}", velocity(&last));
     works(&folder, "snow shot.toml -o fresh -q");
     assert!(output(&folder.join("out")) == output(&folder.join("fresh")));
@@ -117,7 +116,7 @@ fn every_object_has_a_prim_of_its_own() {
     let folder = folder(1, 0.1, &format!("[output]\nobjects = [\"usd\"]\n{objects}"));
     ["boot.obj", "boot_2.obj"].iter().for_each(|name| fs::write(folder.join(name), CUBE).unwrap());
     works(&folder, "snow shot.toml -o out -q");
-    let clip = fs::read_to_string(folder.join("out/objects/objects.0001.usda")).unwrap();
+    let clip = usda::text(&folder.join("out/objects/objects.0001.usdc"));
     let names: Vec<&str> =
         clip.split("def Mesh \"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
     assert_eq!(names.len(), 4, "{clip}");

@@ -7,6 +7,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use crate::common::character::output;
+use crate::common::usda;
 use crate::program::{CUBE, Folder, command, fails, kill_at, works};
 
 /// A folder with a cube that slides through snow for so many frames; `output` stands in the scene's table.
@@ -311,14 +312,10 @@ fn shot_usda_names_every_file_by_a_relative_path() {
     for asset in assets {
         assert!(asset.starts_with("./") && folder.join("out").join(asset).is_file(), "{asset}");
     }
-    let clip = fs::read_to_string(folder.join("out/objects/objects.0002.usda")).unwrap();
+    let clip = usda::text(&folder.join("out/objects/objects.0002.usdc"));
     // 0.9 m along z in 11 frames of 1/24 s; corners turn besides, so look at their mean.
-    let velocities = clip.split("velocities.timeSamples = { 2: [").nth(1).unwrap().split(']').next().unwrap();
-    let numbers: Vec<f64> = velocities
-        .split(|letter: char| !letter.is_ascii_digit() && !"+-.e".contains(letter))
-        .filter_map(|word| word.parse().ok())
-        .collect();
+    let numbers = usda::numbers(&clip, "velocities");
     assert_eq!(numbers.len(), 24);
-    let mean = numbers.chunks(3).map(|velocity| velocity[2]).sum::<f64>() / 8.0;
+    let mean = numbers.chunks(3).map(|velocity| f64::from(velocity[2])).sum::<f64>() / 8.0;
     assert!((mean - 0.9 / 11.0 * 24.0).abs() < 1e-3, "{mean}");
 }

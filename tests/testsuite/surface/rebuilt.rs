@@ -15,7 +15,7 @@ use crate::common::clients;
 use crate::common::followed::{array, frame, reported, values, write_mesh};
 use crate::common::liquids::{ball, write_numbered};
 use crate::common::shapes::welded;
-use crate::common::usda::numbers;
+use crate::common::usda::{self, numbers};
 use crate::program::{Folder, kill_at, works};
 
 /// Initial distance between particles (m).
@@ -320,7 +320,7 @@ fn usd_has_other_faces_from_frame_to_frame_and_primvars_that_fit_them() {
     let python = clients::usd_python();
     let mut all = Vec::new();
     for number in 1..=7 {
-        let text = fs::read_to_string(file(&format!("surface/surface.{number:04}.usda"))).unwrap();
+        let text = usda::text(&file(&format!("surface/surface.{number:04}.usdc")));
         let (points, counts) = (numbers(&text, "points").len() / 3, numbers(&text, "faceVertexCounts"));
         let indices = numbers(&text, "faceVertexIndices");
         let made = frame(folder, "out", number);

@@ -12,7 +12,7 @@ use serde_json::json;
 use crate::common::clients;
 use crate::common::followed::{self, counted, write_mesh};
 use crate::common::liquids::{ball, write_numbered};
-use crate::common::usda::numbers;
+use crate::common::usda::{self, numbers};
 use crate::program::{Folder, works};
 
 /// Two frames of a ball of particles that travels, and a mesh around it with colours, masks and a triangle that is too far away to
@@ -79,8 +79,8 @@ fn the_arrays_of_a_mesh_and_of_each_frame_are_primvars() {
     works(folder, &format!("{SHOT} -o out --set output.surface=[\"ply\",\"usd\"]"));
     let file = |name: &str| folder.join("out").join(name);
     // The shot, the manifest of its clips and every clip say the same of them.
-    for name in ["shot.usda", "surface/surface.manifest.usda", "surface/surface.0001.usda"] {
-        let text = fs::read_to_string(file(name)).unwrap();
+    for name in ["shot.usda", "surface/surface.manifest.usda", "surface/surface.0001.usdc"] {
+        let text = usda::text(&file(name));
         for (primvar, class, interpolation) in PRIMVARS {
             let after = text.split(&format!("{class} primvars:{primvar} (")).nth(1);
             let after = after.unwrap_or_else(|| panic!("{name}: no {primvar}")).trim_start();
@@ -89,7 +89,7 @@ fn the_arrays_of_a_mesh_and_of_each_frame_are_primvars() {
     }
     let python = clients::usd_python();
     for frame in 1..=2 {
-        let text = fs::read_to_string(file(&format!("surface/surface.{frame:04}.usda"))).unwrap();
+        let text = usda::text(&file(&format!("surface/surface.{frame:04}.usdc")));
         let made = mesh::read_detailed(&file(&format!("surface/surface.{frame:04}.ply"))).unwrap();
         let delta = numbers(&text, "primvars:delta");
         assert_eq!(delta.iter().filter(|delta| delta.is_nan()).count(), 3, "the triangle that is far away");
@@ -107,7 +107,7 @@ fn the_arrays_of_a_mesh_and_of_each_frame_are_primvars() {
         fs::write(file("wanted.json"), serde_json::Value::Object(wanted).to_string()).unwrap();
         for (name, prim) in [
             ("shot.usda".to_string(), "/shot/surface/surface"),
-            (format!("surface/surface.{frame:04}.usda"), "/surface/surface"),
+            (format!("surface/surface.{frame:04}.usdc"), "/surface/surface"),
         ] {
             let said =
                 clients::usd_reads_arrays(python, &file(&name), prim, frame, &file("wanted.json")).unwrap();
@@ -116,6 +116,13 @@ fn the_arrays_of_a_mesh_and_of_each_frame_are_primvars() {
     }
     if python.is_none() {
         skipped("no usd-core");
+    }
+    match clients::validators() {
+        Some(python) => {
+            let said = clients::usd_is_whole(&python, &folder.join("out")).unwrap();
+            assert!(said.starts_with("2 parts"), "{said}");
+        }
+        None => skipped("no usd-validation-nvidia"),
     }
 }
 
@@ -127,11 +134,11 @@ fn usd_has_the_attributes_that_are_asked_for() {
         folder,
         &format!("{SHOT} -o out --set output.surface=[\"usd\"] --set output.attributes=[\"flagged\"]"),
     );
-    for name in ["shot.usda", "surface/surface.manifest.usda", "surface/surface.0002.usda"] {
-        let text = fs::read_to_string(folder.join("out").join(name)).unwrap();
+    for name in ["shot.usda", "surface/surface.manifest.usda", "surface/surface.0002.usdc"] {
+        let text = usda::text(&folder.join("out").join(name));
         assert!(text.contains("primvars:flagged") && !text.contains("primvars:delta"), "{name}: {text}");
     }
-    let text = fs::read_to_string(folder.join("out/surface/surface.0002.usda")).unwrap();
+    let text = usda::text(&folder.join("out/surface/surface.0002.usdc"));
     let flagged = numbers(&text, "primvars:flagged");
     let count = flagged.len();
     assert_eq!(flagged[count - 3..], [1.0; 3], "the triangle that is far away");

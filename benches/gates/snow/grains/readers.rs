@@ -48,9 +48,9 @@ pub fn run(h: &mut Harness) {
     }
     if h.wants(usd) {
         let answer = clients::usd_python().map(|python| {
-            let [file, seen] = ["grains.usda", "ours"].map(|name| folder.path().join(name));
+            let [file, seen] = ["grains.usdc", "ours"].map(|name| folder.path().join(name));
             let frame = usd::points::frame("grains", FRAME, 24.0, &grains.points());
-            std::fs::write(&file, frame).expect("a file");
+            std::fs::write(&file, frame.bytes(usd::Format::Binary).expect("a layer")).expect("a file");
             std::fs::write(&seen, &ours).expect("a file");
             clients::usd_reads_grains(&python, &file, &seen, FRAME)
         });

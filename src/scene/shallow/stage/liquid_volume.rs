@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::DVec3;
-use crate::io::usd::{Field, Holds};
+use crate::io::usd::{Contents, Field, Holds};
 use crate::numeric::blocks::{Block, BlockEdit, DIM, Origin, VOXELS, offset, origin_of};
 use crate::scene::Scene;
 use crate::scene::run::Volume;
 use crate::scene::shallow::Shallow;
-use crate::scene::vdb_metadata::metadata;
+use crate::scene::vdb_metadata::{contents, metadata};
 use crate::shallow;
 use crate::vdb::file::{WriteOptions, to_bytes};
 use crate::vdb::{DENSITY_SCALE_KEY, FloatGrid, GridClass, MetaValue};
@@ -26,7 +26,7 @@ pub(in crate::scene::shallow) fn of_shot(kind: &'static str) -> Volume {
     Volume { kind, prim: "liquid_volume", fields: FIELDS, is_guide: false }
 }
 
-/// The bytes of a frame's .vdb file.
+/// The bytes of a frame's .vdb file, and what it holds.
 ///
 /// `made_from` is the hash of everything that the frame was made from.
 ///
@@ -39,11 +39,12 @@ pub(in crate::scene::shallow) fn bytes(
     liquid: &shallow::Shallow,
     frame: i32,
     made_from: &str,
-) -> Result<Vec<u8>> {
+) -> Result<(Vec<u8>, Vec<(String, Contents)>)> {
     let mut metadata = metadata(scene, frame, made_from);
     metadata.push(("volume_m3".into(), MetaValue::Double(liquid.balance().inside)));
     let grid = ctx.phase("volume", || density(ctx, liquid, OPTICAL_THICKNESS / setup.opaque_depth))?;
-    to_bytes(&[&grid], &WriteOptions { metadata, ..WriteOptions::default() })
+    let bytes = to_bytes(&[&grid], &WriteOptions { metadata, ..WriteOptions::default() })?;
+    Ok((bytes, contents(&[&grid])))
 }
 
 /// The fraction of each voxel that is liquid. Voxels are as large as cells and aligned with them; the heights of their centres are multiples

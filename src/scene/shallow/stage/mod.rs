@@ -16,7 +16,7 @@ use crate::geometry::mesh::attributes::{Number, On};
 use crate::geometry::{MeshArray, TriMesh};
 use crate::io::mesh;
 use crate::io::usd::materials::Look;
-use crate::io::usd::{ClipPrims, Clips, MeshPrim, primvars};
+use crate::io::usd::{ClipPrims, Clips, Contents, MeshPrim, Shading, primvars};
 use crate::scene::Scene;
 use crate::scene::run::settings::{settings_of, settings_of_first_state};
 use crate::scene::run::{
@@ -52,8 +52,8 @@ pub struct State<'a> {
 pub struct FrameData {
     surface: LiquidMesh,
     state: Vec<u8>,
-    /// A .vdb file.
-    volume: Option<Vec<u8>>,
+    /// A .vdb file, and what it holds.
+    volume: Option<(Vec<u8>, Vec<(String, Contents)>)>,
     /// The terrain and its stains.
     terrain: Option<(TriMesh, Vec<f32>)>,
 }
@@ -138,7 +138,7 @@ impl Stage for Liquid<'_> {
 
     fn kinds(&self) -> &'static [FileKind] {
         &[
-            FileKind { name: NAME, extensions: &["ply", "usda"] },
+            FileKind { name: NAME, extensions: &["ply", "usdc", "usda"] },
             FileKind { name: VOLUME, extensions: &["vdb"] },
             FileKind { name: TERRAIN, extensions: &["ply"] },
         ]
@@ -204,7 +204,8 @@ impl Stage for Liquid<'_> {
     fn clip(&self) -> Option<Clips<'_>> {
         let arrays = LiquidMesh::empty(self.setup).arrays(self.setup.output);
         let primvars = primvars::primvars(&arrays.iter().collect::<Vec<&MeshArray>>());
-        let mesh = MeshPrim { name: NAME.into(), look: self.look(), moves: true, uvs: None, primvars };
+        let (name, look, shading) = (NAME.into(), self.look(), Shading::Smooth);
+        let mesh = MeshPrim { name, look, moves: true, uvs: None, primvars, shading };
         Some(Clips::new(NAME, ClipPrims::Meshes(vec![mesh])))
     }
 }
@@ -264,8 +265,9 @@ impl<'a> Stepping for Liquid<'a> {
             let carried = mesh::Carried { velocities: &surface.velocities, uvs: None, arrays: &arrays };
             files.save_clip(NAME, self.scene.shot.fps, &surface.mesh, &carried)?;
         }
-        if let Some(volume) = volume {
-            files.save(VOLUME, "vdb", &volume)?;
+        if let Some((bytes, contents)) = volume {
+            files.save(VOLUME, "vdb", &bytes)?;
+            files.describe(VOLUME, &contents);
         }
         if let Some((mesh, stains)) = terrain {
             let values = stains.into_iter().map(f64::from).collect();

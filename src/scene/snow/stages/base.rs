@@ -11,7 +11,7 @@ use crate::scene::run::{
     DoneFrames, FileKind, FrameFiles, Reads, Report, Settings, Stage, StepTarget, Stepped, Stepping, Volume,
 };
 use crate::scene::snow::inputs::Inputs;
-use crate::scene::vdb_metadata::metadata;
+use crate::scene::vdb_metadata::{contents, metadata};
 use crate::scene::{BaseMode, Scene, moving};
 use crate::snow::base_layer::{BaseLayer, Changes, Grids, Params, StepReport};
 use crate::sweep::{Body, TOLERANCE};
@@ -189,11 +189,16 @@ impl Stepping for Base<'_> {
         if output.removed {
             let bytes = vdb_bytes(self.scene, step.frame, &[&step.changes.removed], files.made_from)?;
             files.save("removed", "vdb", &bytes)?;
+            files.describe("removed", &contents(&[&step.changes.removed]));
         }
         if output.base {
             match &step.whole {
                 Some(bytes) => files.save("base", "vdb", bytes)?,
                 None => files.save("base", "vdb", &self.base_bytes(writer, &step, files.made_from)?)?,
+            }
+            // Only whole layers are volumes of the shot.
+            if let Some(copy) = writer.copy.as_ref().filter(|_| output.base_mode == BaseMode::Full) {
+                files.describe("base", &contents(&[&copy.surface]));
             }
         }
         if !output.base_restarts() {

@@ -180,7 +180,7 @@ impl Stage for Grains<'_> {
     }
 
     fn kinds(&self) -> &'static [FileKind] {
-        &[FileKind { name: "grains", extensions: &["vdb", "ply", "usda"] }]
+        &[FileKind { name: "grains", extensions: &["vdb", "ply", "usdc", "usda"] }]
     }
 
     fn writes(&self, _kind: &str) -> bool {
@@ -298,8 +298,8 @@ impl Stepping for Grains<'_> {
             }
             if output.grains_usd {
                 let points = for_clips(points.clone());
-                let text = points::frame("grains", files.frame, self.scene.shot.fps, &points);
-                files.save("grains", "usda", text.as_bytes())?;
+                let fps = self.scene.shot.fps;
+                files.save_usd("grains", points::frame("grains", files.frame, fps, &points))?;
             }
             files.save_state(&grains.save())?;
         }

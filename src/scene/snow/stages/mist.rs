@@ -19,7 +19,7 @@ use crate::scene::run::{
 use crate::scene::snow::inputs::Inputs;
 use crate::scene::snow::keys::mist::mist_params;
 use crate::scene::snow::wind::wind_file;
-use crate::scene::vdb_metadata::metadata;
+use crate::scene::vdb_metadata::{contents, metadata};
 use crate::scene::{Scene, moving};
 use crate::snow::mist::{self, Grids, Params, Source, Start, StepInputs, StepReport, Surroundings, Wind};
 use crate::sweep::Body;
@@ -288,9 +288,11 @@ impl Stepping for Mist<'_> {
         if self.scene.output.mist {
             let grids = Grids::of(ctx, &mist)?;
             let metadata = metadata(self.scene, files.frame, files.made_from);
-            let grids = [GridRef::Floats(&grids.density), GridRef::Vectors(&grids.velocity)];
+            let Grids { density, velocity } = grids;
+            let grids = [GridRef::Floats(&density), GridRef::Vectors(&velocity)];
             let options = WriteOptions { metadata, ..WriteOptions::default() };
             files.save(NAME, "vdb", &any_to_bytes(&grids, &options)?)?;
+            files.describe(NAME, &contents(&[&density]));
         }
         files.save_state(&mist.save())
     }

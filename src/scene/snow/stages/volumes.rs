@@ -12,7 +12,7 @@ use crate::geometry::{DVec3, Points, TriMesh};
 use crate::io::mesh;
 use crate::io::records::manifest::Keeps;
 use crate::io::usd::materials::Look;
-use crate::io::usd::{self, ClipPrims, Clips, Field, Holds, MeshPrim};
+use crate::io::usd::{self, ClipPrims, Clips, Field, Holds, MeshPrim, Shading};
 use crate::scene::run::settings::settings_of;
 use crate::scene::run::{
     DoneFrames, FileKind, FrameFiles, Report, Settings, Stage, StepTarget, Stepped, Stepping, Volume,
@@ -21,7 +21,7 @@ use crate::scene::snow::Inputs;
 use crate::scene::snow::estimate::memory;
 use crate::scene::snow::grain_params::params;
 use crate::scene::snow::keys::volumes::Needs;
-use crate::scene::vdb_metadata::metadata;
+use crate::scene::vdb_metadata::{contents, metadata};
 use crate::scene::{Scene, VolumesOutput};
 use crate::snow::render_volumes::{fog, united};
 use crate::vdb::file::{WriteOptions, to_bytes};
@@ -50,9 +50,25 @@ struct Source<'s> {
     mist: Option<FloatGrid>,
 }
 
-/// Files of a frame: kinds, extensions and contents. Grids are packed while they wait for the writer: unpacked, those of several frames
-/// would take too much memory.
-type Files = Vec<(&'static str, &'static str, Vec<u8>)>;
+/// Files of a frame. They are packed while they wait for the writer: unpacked, those of several frames would take too much memory.
+type Files = Vec<Packed>;
+
+/// A file of a frame.
+pub struct Packed {
+    kind: &'static str,
+    extension: &'static str,
+    bytes: Vec<u8>,
+    /// What it holds, for the report.
+    contents: Vec<(String, usd::Contents)>,
+}
+
+impl Packed {
+    /// A .vdb file.
+    fn grids(kind: &'static str, grids: &[&FloatGrid], options: &WriteOptions) -> Result<Self> {
+        let bytes = to_bytes(grids, options)?;
+        Ok(Self { kind, extension: "vdb", bytes, contents: contents(grids) })
+    }
+}
 
 /// Name of the mesh's prim.
 const MESH: &str = "base";
@@ -143,34 +159,38 @@ impl<'a> Volumes<'a> {
             // Renderers use at most 16 bits of a density.
             let options = WriteOptions { half: true, ..options.clone() };
             let grids: Vec<&FloatGrid> = grids.iter().collect();
-            files.push(("fog", "vdb", ctx.phase("pack", || to_bytes(&grids, &options))?));
+            files.push(ctx.phase("pack", || Packed::grids("fog", &grids, &options))?);
         }
         let Some(surface) = source.base else { return Ok((files, results)) };
         if self.output.snow {
             let grid = ctx.phase("snow", || self.snow(ctx, surface, source.grains))?;
             results.insert("snow_voxels".into(), json!(grid.active_voxels()));
-            files.push(("snow", "vdb", ctx.phase("pack", || to_bytes(&[&grid], &options))?));
+            files.push(ctx.phase("pack", || Packed::grids("snow", &[&grid], &options))?);
         }
         if self.output.mesh() {
             let mesh = ctx.phase("mesh", || level_set::to_mesh(ctx, surface, 0.0, 0.0))?;
             results.insert("mesh_triangles".into(), json!(mesh.triangles.len()));
-            files.extend(ctx.phase("pack", || Ok(self.mesh_files(&mesh, source.frame)))?);
+            files.extend(ctx.phase("pack", || self.mesh_files(&mesh, source.frame))?);
         }
         Ok((files, results))
     }
 
     /// The files of the base's surface.
-    fn mesh_files(&self, surface: &TriMesh, frame: i32) -> Files {
+    fn mesh_files(&self, surface: &TriMesh, frame: i32) -> Result<Files> {
         let (mut files, carried) = (Files::new(), mesh::Carried::default());
         if self.output.mesh_ply {
-            files.push(("mesh", "ply", mesh::ply_bytes(surface, &carried)));
+            let bytes = mesh::ply_bytes(surface, &carried);
+            files.push(Packed { kind: "mesh", extension: "ply", bytes, contents: Vec::new() });
         }
         if self.output.mesh_usd {
-            let mesh = usd::MeshFrame::of(MESH, surface, &carried);
-            let text = usd::clip("mesh", frame, self.scene.shot.fps, usd::Units::OWN, &[mesh]);
-            files.push(("mesh", "usda", text.into_bytes()));
+            let mesh = usd::MeshFrame::of(MESH, surface, &carried, Shading::Smooth);
+            let (fps, units) = (self.scene.shot.fps, usd::Units::OWN);
+            let file = usd::clip("mesh", frame, fps, units, &[mesh]);
+            let contents = file.contents().to_vec();
+            let bytes = file.bytes(usd::Format::Binary)?;
+            files.push(Packed { kind: "mesh", extension: usd::BINARY, bytes, contents });
         }
-        files
+        Ok(files)
     }
 }
 
@@ -195,7 +215,7 @@ impl Stage for Volumes<'_> {
         &[
             FileKind { name: "fog", extensions: &["vdb"] },
             FileKind { name: "snow", extensions: &["vdb"] },
-            FileKind { name: "mesh", extensions: &["ply", "usda"] },
+            FileKind { name: "mesh", extensions: &["ply", "usdc", "usda"] },
         ]
     }
 
@@ -265,7 +285,8 @@ impl Stage for Volumes<'_> {
     fn clip(&self) -> Option<Clips<'_>> {
         // A different mesh at each frame, without velocities.
         let (name, primvars) = (MESH.into(), Vec::new());
-        let mesh = MeshPrim { name, look: Look::Snow, moves: false, uvs: None, primvars };
+        let mesh =
+            MeshPrim { name, look: Look::Snow, moves: false, uvs: None, primvars, shading: Shading::Smooth };
         self.output.mesh_usd.then(|| Clips::new("mesh", ClipPrims::Meshes(vec![mesh])))
     }
 }
@@ -315,7 +336,10 @@ impl Stepping for Volumes<'_> {
 
     fn write(&self, _writer: &mut (), step: Files, files: Option<&mut FrameFiles>) -> Result<()> {
         let Some(files) = files else { return Ok(()) };
-        step.into_iter().try_for_each(|(kind, extension, bytes)| files.save(kind, extension, &bytes))
+        step.into_iter().try_for_each(|Packed { kind, extension, bytes, contents }| {
+            files.describe(kind, &contents);
+            files.save(kind, extension, &bytes)
+        })
     }
 }
 

@@ -17,7 +17,7 @@ use crate::error::Result;
 use crate::geometry::mesh::attributes::{Number, On};
 use crate::geometry::{DetailedMesh, MeshArray, TriMesh, Vec3};
 use crate::io::usd::materials::Look;
-use crate::io::usd::{ClipPrims, Clips, MeshPrim, primvars};
+use crate::io::usd::{ClipPrims, Clips, MeshPrim, Shading, primvars};
 use crate::io::{mesh, usd};
 use crate::mesh_repair::Traced;
 use crate::scene::Scene;
@@ -86,7 +86,7 @@ impl Stage for Track<'_> {
     }
 
     fn kinds(&self) -> &'static [FileKind] {
-        &[FileKind { name: NAME, extensions: &["ply", "usda", "obj"] }]
+        &[FileKind { name: NAME, extensions: &["ply", "usdc", "usda", "obj"] }]
     }
 
     fn writes(&self, _kind: &str) -> bool {
@@ -133,7 +133,8 @@ impl Stage for Track<'_> {
         let arrays: Vec<&MeshArray> = self.carried(mesh).chain(&frame_arrays).collect();
         let primvars = primvars::primvars(&arrays);
         let uvs = mesh.uvs.as_ref();
-        let mesh = MeshPrim { name: NAME.into(), look: Look::Object, moves: true, uvs, primvars };
+        let (name, shading) = (NAME.into(), Shading::Smooth);
+        let mesh = MeshPrim { name, look: Look::Object, moves: true, uvs, primvars, shading };
         Some(Clips::new(NAME, ClipPrims::Meshes(vec![mesh])))
     }
 }
