@@ -1,9 +1,11 @@
 //! Meshes in USD: a layer of one frame, and what its prims have in common from frame to frame.
 
+use std::borrow::Cow;
+
+use super::file::{Contents, File, Units, bounds, extent_value};
 use super::layer::{Attribute, Layer, Prim, Value};
 use super::materials::Look;
 use super::primvars::{self, Faces, Primvar};
-use super::{Contents, File, Units, bounds, extent_value};
 use crate::geometry::mesh::normals;
 use crate::geometry::{MeshArray, TriMesh, Uvs, Vec3};
 use crate::io::mesh::Carried;
@@ -25,6 +27,21 @@ pub struct MeshFrame<'a> {
     pub arrays: &'a [&'a MeshArray],
     /// How its surface is shaded.
     pub shading: Shading,
+}
+
+/// The points of a mesh. Those of no face are at a point of a face: they are not visible, and in USD all points are within the extent, so
+/// that a stray one would make it useless.
+fn points_of_faces<'a>(points: &'a [Vec3], triangles: &[[u32; 3]]) -> Cow<'a, [Vec3]> {
+    let mut is_used = vec![false; points.len()];
+    triangles.as_flattened().iter().for_each(|vertex| is_used[*vertex as usize] = true);
+    match is_used.iter().position(|is_used| *is_used) {
+        Some(first) if is_used.contains(&false) => {
+            let placed =
+                points.iter().zip(is_used).map(|(p, is_used)| if is_used { *p } else { points[first] });
+            Cow::Owned(placed.collect())
+        }
+        _ => Cow::Borrowed(points),
+    }
 }
 
 /// How a surface is shaded, by the normals that are written.
@@ -57,8 +74,8 @@ impl<'a> MeshFrame<'a> {
         };
         let corners = triangles.as_flattened();
         let rows = |vectors: &[Vec3]| Value::Vectors(vectors.iter().map(|vector| (*vector).into()).collect());
-        // Of all points, as USD has it, also those of no face.
-        let extent = bounds(self.points.iter().map(|point| (*point, *point)));
+        let placed = points_of_faces(self.points, &triangles);
+        let extent = bounds(placed.iter().map(|point| (*point, *point)));
         let shown = if triangles.is_empty() { "invisible" } else { "inherited" };
         let [visibility, extent_attribute, counts, indices, points, velocities] =
             DECLARED.map(Attribute::declared);
@@ -67,7 +84,7 @@ impl<'a> MeshFrame<'a> {
             extent_attribute.at(frame, extent_value(extent)),
             counts.at(frame, Value::Ints(vec![3; triangles.len()])),
             indices.at(frame, Value::Ints(corners.iter().map(|vertex| *vertex as i32).collect())),
-            points.at(frame, rows(self.points)),
+            points.at(frame, rows(&placed)),
         ];
         if self.velocities.len() == self.points.len() {
             out.push(velocities.at(frame, rows(self.velocities)));
@@ -90,7 +107,7 @@ impl<'a> MeshFrame<'a> {
         }
         let (units, indices) = match self.shading {
             Shading::Smooth => (normals::smooth(self.points, &triangles), Vec::new()),
-            Shading::Creased => normals::creased(self.points, &triangles, CREASE.to_radians().cos()),
+            Shading::Creased => normals::creased(self.points, &triangles, libm::cos(CREASE.to_radians())),
         };
         // A point of no face has none, and USD wants a direction.
         let unit = |normal: &Vec3| if *normal == Vec3::zeros() { Vec3::y() } else { *normal };
@@ -250,8 +267,8 @@ mod tests {
         assert_eq!(value("primvars:face"), Value::Floats(vec![2.0]));
         assert_eq!(value("primvars:corner"), Value::Floats(vec![3.0, 4.0, 5.0]));
         assert_eq!(value("primvars:st:indices"), Value::Ints(vec![3, 4, 5]));
-        assert_eq!(value("primvars:normals:indices"), Value::Ints(vec![0, 1, 2]));
-        assert_eq!(value("extent"), Value::Vectors(vec![[0.0; 3], [2.0, 1.0, 0.0]]));
+        assert_eq!(value("primvars:normals:indices"), Value::Ints(vec![0, 0, 0]));
+        assert_eq!(value("extent"), Value::Vectors(vec![[0.0; 3], [1.0, 1.0, 0.0]]));
         let none = MeshFrame {
             shading: Shading::Smooth,
             triangles: &triangles[..1],

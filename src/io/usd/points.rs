@@ -1,8 +1,9 @@
 //! Points in USD: one `Points` prim, one file per frame.
 
+use super::file::{Contents, File, Units, bounds, extent_value};
 use super::layer::{Attribute, Layer, Prim, Value};
 use super::primvars::unique;
-use super::{Contents, File, Units, bounds, extent_value, prim_name};
+use super::text::prim_name;
 use crate::geometry::Vec3;
 use crate::geometry::points::{self, Points, Values};
 

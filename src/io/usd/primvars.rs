@@ -5,7 +5,7 @@
 //! `NAME`.
 
 use super::layer::{Attribute, Value};
-use super::prim_name;
+use super::text::prim_name;
 use crate::geometry::mesh::attributes::{MeshArray, Number, On};
 
 /// A primvar without its values.

@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use super::file::{Format, Units};
 use super::layer::{Attribute, Layer, Prim, Value};
 use super::materials::{self, Look};
 use super::mesh::MeshPrim;
+use super::points;
 use super::volumes::VolumeFiles;
-use super::{Format, Units, points};
 use crate::error::Result;
 use crate::geometry::Points;
 

@@ -1,6 +1,6 @@
 //! Volumes in USD, whose grids are in .vdb files.
 
-use super::extent_value;
+use super::file::extent_value;
 use super::layer::{Attribute, Prim, Value};
 use super::materials::Look;
 

@@ -48,9 +48,8 @@ pub(in crate::scene::shallow) fn memory(setup: &Shallow, grid: &Grid, columns: u
     FIXED + CELL * grid.cells() as u64 + column * columns + triangle * triangles + drops
 }
 
-/// Bytes of a 32-bit float in text with its separators, and of an index.
-const TEXT: u64 = 12;
-const INDEX: u64 = 8;
+/// Bytes of an index in a USD file, packed.
+const INDEX: u64 = 2;
 /// Bytes of a column in the exact state, unpacked; of a scalar in a column; and of a drop, with the volume waiting at a link.
 const STATE: u64 = 20;
 const STATE_OF_SCALAR: u64 = 8;
@@ -78,9 +77,9 @@ pub(in crate::scene::shallow) fn frame_bytes(setup: &Shallow, columns: u64, tria
     let vertex = 12 + if_asked(output.velocities, 12) + arrays;
     // Two triangles for each vertex, each with a byte for its count of corners.
     let ply = vertex + 2 * 13;
-    let numbers = 6 + u64::from(output.depth) + u64::from(output.alpha) + u64::from(output.layer);
-    let numbers = numbers + carried + falling;
-    let usd = TEXT * numbers + 2 * 3 * INDEX + 2 * 3;
+    // Position, velocity and normal.
+    let numbers = 9 + u64::from(output.depth) + u64::from(output.alpha) + u64::from(output.layer);
+    let usd = 4 * (numbers + carried + falling) + 2 * 3 * INDEX;
     let state = STATE + STATE_OF_SCALAR * scalars;
     let each = if_asked(output.ply, ply) + if_asked(output.usd, usd) + if_asked(output.vdb, VOXEL) + state;
     let drops = setup.params.falls.map_or(0, |falls| falls.max_packets);

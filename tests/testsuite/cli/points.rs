@@ -153,7 +153,7 @@ fn convert_writes_points_of_usd() {
         "def Points \"g\"",
         "timeCodesPerSecond = 25",
         "int64[] ids.timeSamples = { 5: [0, 1, 2,",
-        "float[] widths.timeSamples = { 5: [0.008] }",
+        "float[] widths.timeSamples = { 5: [0.008, 0.008,",
         "vector3f[] velocities.timeSamples = { 5: [(0, -1.25, 0), (0.5, -1.25, 0),",
         "int[] primvars:source_frame.timeSamples = { 5: [0, 1,",
         "bool[] primvars:active.timeSamples = { 5: [1, 0, 0, 1,",

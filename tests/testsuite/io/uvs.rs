@@ -80,12 +80,19 @@ fn shot(folder: &Path, object: &str, out: &str) {
     works(folder, &format!("snow shot.toml -o {out} -q"));
 }
 
+/// A mesh as it is in USD, where vertices of no face are at the first one of a face.
+fn placed((points, faces): (Vec<[f32; 3]>, Vec<Vec<Corner>>)) -> (Vec<[f32; 3]>, Vec<Vec<Corner>>) {
+    let is_used = |point: &[f32; 3]| faces.iter().flatten().any(|(corner, _)| corner == point);
+    let first = *points.iter().find(|point| is_used(point)).unwrap();
+    (points.iter().map(|point| if is_used(point) { *point } else { first }).collect(), faces)
+}
+
 /// Compares a shot's objects at its last frame with a mesh where it is then.
 fn same_objects(folder: &Path, out: &str, want: &(Vec<[f32; 3]>, Vec<Vec<Corner>>), seams: bool) {
     let file = |extension: &str| folder.join(format!("{out}/objects/objects.0003.{extension}"));
     let want = moved(want.clone(), [0.25, 0.0, -0.25]);
     assert_eq!(corners(&file("ply")), want, "ply");
-    assert_eq!(usd(&file("usdc"), seams), want, "usd");
+    assert_eq!(usd(&file("usdc"), seams), placed(want), "usd");
     let stage = fs::read_to_string(folder.join(out).join("shot.usda")).unwrap();
     let kind = if seams { "faceVarying" } else { "vertex" };
     let declared = format!("texCoord2f[] primvars:st (\n                interpolation = \"{kind}\"\n");

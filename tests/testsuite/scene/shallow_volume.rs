@@ -7,6 +7,7 @@ use frazil::geometry::TriMesh;
 use frazil::io::mesh;
 use frazil::vdb::{FloatGrid, GridClass, file};
 
+use crate::common::usda;
 use crate::program::{Folder, fails, works};
 
 /// A block of 8 x 2 x 8 cm whose top is at 0, and a scene with a pool on it, 3 mm deep, and a film.
@@ -58,7 +59,9 @@ fn the_volume_holds_all_of_the_liquid() {
         assert!(most <= 1.000_01, "{most}");
     }
     let text = fs::read_to_string(folder.join("out/shot.usda")).unwrap();
-    assert!(text.contains("OpenVDBAsset \"density\"") && text.contains("volume/volume.0003.vdb"), "{text}");
+    assert!(text.contains("OpenVDBAsset \"density\"") && text.contains("@./shot.samples.usdc@"), "{text}");
+    let samples = usda::text(&folder.join("out/shot.samples.usdc"));
+    assert!(samples.contains("volume/volume.0003.vdb"), "{samples}");
     works(folder, "preview out/volume/volume.0001.vdb block.ply -o fog.png --size 32x24");
     works(folder, "check out");
 }

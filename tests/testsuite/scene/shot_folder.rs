@@ -148,9 +148,14 @@ fn a_user_s_own_files_are_never_written_over() {
     fails(&folder, "snow scene.toml -o .", 2, &["scene.toml", "another -o"]);
     assert_eq!(fs::read(folder.join("scene.toml")).unwrap(), scene);
     assert!(!folder.join("state").exists());
-    for foreign in
-        ["scene.toml", "shot.usda", "base/base.0001.vdb", "removed/removed.0002.vdb", "report/base.0002.json"]
-    {
+    for foreign in [
+        "scene.toml",
+        "shot.usda",
+        "shot.samples.usdc",
+        "base/base.0001.vdb",
+        "removed/removed.0002.vdb",
+        "report/base.0002.json",
+    ] {
         let path = folder.join("out").join(foreign);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(&path, "mine").unwrap();

@@ -306,7 +306,9 @@ fn the_resolved_scene_of_overrides_makes_the_same_again() {
 fn shot_usda_names_every_file_by_a_relative_path() {
     let folder = folder(3, 0.04, "objects = [\"usd\"]");
     works(&folder, "snow shot.toml -o out -q");
-    let stage = fs::read_to_string(folder.join("out/shot.usda")).unwrap();
+    let [shot, samples] =
+        ["shot.usda", "shot.samples.usdc"].map(|name| usda::text(&folder.join("out").join(name)));
+    let stage = shot + &samples;
     let assets: Vec<&str> = stage.split('@').skip(1).step_by(2).collect();
     assert!(assets.len() > 9, "{stage}");
     for asset in assets {

@@ -89,9 +89,12 @@ fn shot_usda_has_volumes_with_materials() {
     let at = &folder(GRAINS, &format!("grains = [\"vdb\", \"usd\"]\nobjects = [\"usd\"]\n{ALL}"));
     works(at, "snow shot.toml -o out -q");
     let stage = fs::read_to_string(at.join("out/shot.usda")).unwrap();
-    let assets: Vec<&str> = stage.split('@').skip(1).step_by(2).collect();
+    let all = format!("{stage}{}", usda::text(&at.join("out/shot.samples.usdc")));
+    let assets: Vec<&str> = all.split('@').skip(1).step_by(2).collect();
     assets.iter().for_each(|asset| assert!(at.join("out").join(asset).is_file(), "{asset}"));
-    assert!(assets.iter().any(|asset| asset.starts_with("./mesh/")), "{stage}");
+    for kind in ["fog", "snow", "mesh"] {
+        assert!(assets.iter().any(|asset| asset.starts_with(&format!("./{kind}/"))), "{kind} in {all}");
+    }
     for words in [
         "def Volume \"fog_grains\" (\n        prepend apiSchemas = [\"MaterialBindingAPI\"]\n    )",
         "custom float frazil:density_scale = 100\n",

@@ -26,7 +26,7 @@ fn write_shot(folder: &Path) {
     }
     let mut body = ball.mesh;
     let far = body.positions.len() as u32;
-    body.positions.extend([0.3, 0.31, 0.32].map(|x| Vec3::new(x, x - 0.3, 0.01)));
+    body.positions.extend([0.3, 0.31, 0.32].map(|x| Vec3::new(x, 10.0 * (x - 0.3) * (x - 0.3), 0.01)));
     body.triangles.push([far, far + 1, far + 2]);
     let (vertices, faces) = (body.positions.len(), body.triangles.len());
     let array = |name: &str, on, number, count| followed::array(name, on, number, counted(count));

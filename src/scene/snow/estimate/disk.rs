@@ -11,18 +11,18 @@ const BYTES_PER_COLUMN: f64 = 20.0;
 const BYTES_PER_CHANGE: f64 = 4e5;
 /// Bytes of a whole base file for each leaf: over 64 columns, the two surfaces cross 3.2 leaves.
 const BYTES_PER_LEAF: f64 = BYTES_PER_COLUMN * 64.0 / 3.2;
-/// Bytes for each vertex of an object in a .usda and a .ply file.
-const USDA_PER_VERTEX: f64 = 110.0;
+/// Bytes for each vertex of an object in a USD and a .ply file.
+const USD_PER_VERTEX: f64 = 50.0;
 const PLY_PER_VERTEX: f64 = 50.0;
-/// Bytes of a pair of texture coordinates and of a corner's index of a pair in a .usda file, and of a pair in a .ply file.
-const USDA_PER_POSITION: f64 = 20.0;
-const USDA_PER_INDEX: f64 = 7.0;
+/// Bytes of a pair of texture coordinates and of a corner's index of a pair in a USD file, and of a pair in a .ply file.
+const USD_PER_POSITION: f64 = 8.0;
+const USD_PER_INDEX: f64 = 2.0;
 const PLY_PER_POSITION: f64 = 8.0;
 /// Bytes of a grain in each kind of file, and in a packed state; the value for files of changes was measured while a character walks.
 const GRAIN_VDB: f64 = 49.0;
 const GRAIN_CHANGES: f64 = 28.0;
 const GRAIN_PLY: f64 = 50.0;
-const GRAIN_USDA: f64 = 125.0;
+const GRAIN_USD: f64 = 40.0;
 const GRAIN_STATE: f64 = 90.0;
 /// Bytes of a grain in a fog and in a united surface.
 const GRAIN_FOG: f64 = 190.0;
@@ -31,7 +31,7 @@ const GRAIN_UNITED: f64 = 60.0;
 const FOG_SHARE: f64 = 0.3;
 /// Bytes for each column of cells in a mesh of the base.
 const MESH_PLY: f64 = 90.0;
-const MESH_USDA: f64 = 180.0;
+const MESH_USD: f64 = 65.0;
 /// Number of states of grains that are kept.
 const STATES: f64 = 2.0;
 
@@ -45,7 +45,7 @@ pub(in crate::scene::snow) fn of_grains(scene: &Scene, counts: &[f64]) -> u64 {
     let each = |frame: usize| {
         f64::from(output.grains_vdb) * vdb(frame)
             + f64::from(output.grains_ply) * GRAIN_PLY
-            + f64::from(output.grains_usd) * GRAIN_USDA
+            + f64::from(output.grains_usd) * GRAIN_USD
             + f64::from(output.volumes.fog_grains) * GRAIN_FOG
             + f64::from(output.volumes.snow) * GRAIN_UNITED
     };
@@ -69,9 +69,9 @@ pub fn estimate(scene: &Scene, inputs: &Inputs) -> u64 {
         let (positions, corners) = drawn.uvs.map_or((0.0, 0.0), |uvs| {
             (uvs.coordinates.len() as f64, uvs.corners.as_ref().map_or(0.0, |corners| corners.len() as f64))
         });
-        let usda = vertices * USDA_PER_VERTEX + positions * USDA_PER_POSITION + corners * USDA_PER_INDEX;
+        let usd = vertices * USD_PER_VERTEX + positions * USD_PER_POSITION + corners * USD_PER_INDEX;
         let ply = vertices * PLY_PER_VERTEX + positions.max(corners) * PLY_PER_POSITION;
-        f64::from(output.objects_usd) * usda + f64::from(output.objects_ply) * ply
+        f64::from(output.objects_usd) * usd + f64::from(output.objects_ply) * ply
     });
     let objects = objects.sum::<f64>() * frames;
     (base + objects + frames * (BYTES_PER_CHANGE + of_volumes(scene, inputs))) as u64
@@ -86,7 +86,7 @@ fn of_volumes(scene: &Scene, inputs: &Inputs) -> f64 {
     f64::from(volumes.fog_base) * whole * FOG_SHARE
         + f64::from(volumes.snow) * whole * fine * fine
         + f64::from(volumes.mesh_ply) * columns * MESH_PLY
-        + f64::from(volumes.mesh_usd) * columns * MESH_USDA
+        + f64::from(volumes.mesh_usd) * columns * MESH_USD
 }
 
 /// Bytes of a whole base file: by its columns, or by the leaves of a layer given as a level set.

@@ -19,7 +19,7 @@ pub const OUTPUT_KEYS: &[Key] = &[
     key(BASE, "output", "removed", Choices(&["vdb"]), or("[\"vdb\"]"))
         .means("removed/removed.%04d.vdb: the snow that each frame removed"),
     key(GRAINS, "output", "grains", Choices(&["vdb", "ply", "usd"]), or("[\"vdb\"]"))
-        .means("grains/grains.%04d.vdb: points with v, id, active, trapped, pscale, source_frame, rest; also \"ply\", \"usd\" (large)"),
+        .means("grains/grains.%04d.vdb: points with v, id, active, trapped, pscale, source_frame, rest; also \"ply\", \"usd\""),
     key(GRAINS, "output", "grains_mode", Choice(&["full", "delta"]), or("\"full\""))
         .means("full, or delta: .vdb files of the first and every 24th frame whole, then only changes (`frazil vdb rebuild`)"),
     key(MIST, "output", "mist", Choices(&["vdb"]), or("[\"vdb\"]"))

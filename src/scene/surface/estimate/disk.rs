@@ -8,6 +8,9 @@ use crate::scene::surface::Files;
 const TEXT: u64 = 12;
 /// Bytes of an index in text besides its digits.
 const INDEX_OVERHEAD: u64 = 2;
+/// Bytes of a vertex in a USD file: position, velocity and normal; and of an index, packed.
+const USD_PER_VERTEX: u64 = 3 * 12;
+const USD_PER_INDEX: u64 = 2;
 /// Bytes of a vertex in the exact state: its position in 64 bits, the distance that it keeps, its flag. Positions hardly compress.
 const STATE_PER_VERTEX: u64 = 3 * 8 + 4 + 1;
 /// Additional bytes of a vertex if the mesh is rebuilt: its displacement since a reference.
@@ -36,15 +39,15 @@ impl FrameSize {
         // In .obj files every corner has an index of its texture coordinates, if there are any.
         let indices = if coordinates > 0 { 6 * triangles } else { 3 * triangles };
         let obj = TEXT * (3 * vertices + 2 * coordinates) + index * indices;
-        // Besides positions, velocities and arrays, .usda files have a count of corners for each face.
-        let array_values: usize = detail.arrays.iter().map(|array| array.values.len()).sum();
+        let array_bytes: usize =
+            detail.arrays.iter().map(|array| array.values.len() * array.number.size().max(4)).sum();
         let if_written = |is_written: bool, bytes: u64| if is_written { bytes } else { 0 };
         let delta = if_written(output.delta, vertices);
-        let flagged = if_written(output.flagged, vertices);
-        let rebuilt = if_written(output.rebuilt, triangles);
-        let usd = TEXT * (6 * vertices + 2 * coordinates + array_values as u64 + delta)
-            + index * (3 * triangles + corners)
-            + (1 + INDEX_OVERHEAD) * (triangles + flagged + rebuilt);
+        // Flags pack to next to nothing.
+        let usd = USD_PER_VERTEX * vertices
+            + 4 * (2 * coordinates + delta)
+            + USD_PER_INDEX * (3 * triangles + corners)
+            + array_bytes as u64;
         Self {
             ply: if_written(output.ply, ply(output, detail)),
             obj: if_written(output.obj, obj),
