@@ -2,7 +2,7 @@
 
 use super::Scene;
 use crate::geometry::DVec3;
-use crate::io::usd::Contents;
+use crate::io::usd::{Contents, ContentsByName};
 use crate::vdb::{FloatGrid, MetaValue};
 
 /// Metadata of every .vdb file of a shot.
@@ -21,7 +21,7 @@ pub(super) fn metadata(scene: &Scene, frame: i32, made_from: &str) -> Vec<(Strin
 }
 
 /// What grids hold, by their names, for the frame's report and `shot.usda`.
-pub(super) fn contents(grids: &[&FloatGrid]) -> Vec<(String, Contents)> {
+pub(super) fn contents(grids: &[&FloatGrid]) -> ContentsByName {
     let of = |grid: &&FloatGrid| (grid.name(), Contents { extent: extent(grid), ..Contents::default() });
     grids.iter().map(of).collect()
 }

@@ -38,8 +38,11 @@ impl Format {
 /// A layer that was made, and what is in it.
 pub struct File {
     pub(super) layer: Layer,
-    pub(super) contents: Vec<(String, Contents)>,
+    pub(super) contents: ContentsByName,
 }
+
+/// What prims or grids hold, with their names.
+pub type ContentsByName = Vec<(String, Contents)>;
 
 /// What a prim or a grid holds at a frame.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -54,7 +57,7 @@ pub struct Contents {
 
 impl File {
     /// What its prims hold, by name.
-    pub fn contents(&self) -> &[(String, Contents)] {
+    pub fn contents(&self) -> &ContentsByName {
         &self.contents
     }
 

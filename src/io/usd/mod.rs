@@ -11,7 +11,7 @@ mod stage;
 mod text;
 mod volumes;
 
-pub use file::{BINARY, Contents, File, Format, Units};
+pub use file::{BINARY, Contents, ContentsByName, File, Format, Units};
 pub use mesh::{MeshFrame, MeshPrim, Shading, clip};
 pub use stage::{ClipPrims, Clips, SAMPLES, StageTime, clip_manifest, manifest_path, samples, stage};
 pub use text::prim_name;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::DVec3;
-use crate::io::usd::{Contents, Field, Holds};
+use crate::io::usd::{ContentsByName, Field, Holds};
 use crate::numeric::blocks::{Block, BlockEdit, DIM, Origin, VOXELS, offset, origin_of};
 use crate::scene::Scene;
 use crate::scene::run::Volume;
@@ -39,7 +39,7 @@ pub(in crate::scene::shallow) fn bytes(
     liquid: &shallow::Shallow,
     frame: i32,
     made_from: &str,
-) -> Result<(Vec<u8>, Vec<(String, Contents)>)> {
+) -> Result<(Vec<u8>, ContentsByName)> {
     let mut metadata = metadata(scene, frame, made_from);
     metadata.push(("volume_m3".into(), MetaValue::Double(liquid.balance().inside)));
     let grid = ctx.phase("volume", || density(ctx, liquid, OPTICAL_THICKNESS / setup.opaque_depth))?;

@@ -16,7 +16,7 @@ use crate::geometry::mesh::attributes::{Number, On};
 use crate::geometry::{MeshArray, TriMesh};
 use crate::io::mesh;
 use crate::io::usd::materials::Look;
-use crate::io::usd::{ClipPrims, Clips, Contents, MeshPrim, Shading, primvars};
+use crate::io::usd::{ClipPrims, Clips, ContentsByName, MeshPrim, Shading, primvars};
 use crate::scene::Scene;
 use crate::scene::run::settings::{settings_of, settings_of_first_state};
 use crate::scene::run::{
@@ -53,7 +53,7 @@ pub struct FrameData {
     surface: LiquidMesh,
     state: Vec<u8>,
     /// A .vdb file, and what it holds.
-    volume: Option<(Vec<u8>, Vec<(String, Contents)>)>,
+    volume: Option<(Vec<u8>, ContentsByName)>,
     /// The terrain and its stains.
     terrain: Option<(TriMesh, Vec<f32>)>,
 }

@@ -59,7 +59,7 @@ pub struct Packed {
     extension: &'static str,
     bytes: Vec<u8>,
     /// What it holds, for the report.
-    contents: Vec<(String, usd::Contents)>,
+    contents: usd::ContentsByName,
 }
 
 impl Packed {
@@ -186,7 +186,7 @@ impl<'a> Volumes<'a> {
             let mesh = usd::MeshFrame::of(MESH, surface, &carried, Shading::Smooth);
             let (fps, units) = (self.scene.shot.fps, usd::Units::OWN);
             let file = usd::clip("mesh", frame, fps, units, &[mesh]);
-            let contents = file.contents().to_vec();
+            let contents = file.contents().clone();
             let bytes = file.bytes(usd::Format::Binary)?;
             files.push(Packed { kind: "mesh", extension: usd::BINARY, bytes, contents });
         }
