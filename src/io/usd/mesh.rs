@@ -36,9 +36,9 @@ fn points_of_faces<'a>(points: &'a [Vec3], triangles: &[[u32; 3]]) -> Cow<'a, [V
     triangles.as_flattened().iter().for_each(|vertex| is_used[*vertex as usize] = true);
     match is_used.iter().position(|is_used| *is_used) {
         Some(first) if is_used.contains(&false) => {
-            let placed =
+            let moved =
                 points.iter().zip(is_used).map(|(p, is_used)| if is_used { *p } else { points[first] });
-            Cow::Owned(placed.collect())
+            Cow::Owned(moved.collect())
         }
         _ => Cow::Borrowed(points),
     }
@@ -49,7 +49,7 @@ fn points_of_faces<'a>(points: &'a [Vec3], triangles: &[[u32; 3]]) -> Cow<'a, [V
 pub enum Shading {
     /// Smooth everywhere: liquid, snow. A normal for each vertex.
     Smooth,
-    /// Smooth but for edges sharper than [`CREASE`], as objects are. A normal for each corner.
+    /// Smooth but for edges where faces meet at more than 40 degrees, as objects are. A normal for each corner.
     Creased,
 }
 
@@ -74,8 +74,8 @@ impl<'a> MeshFrame<'a> {
         };
         let corners = triangles.as_flattened();
         let rows = |vectors: &[Vec3]| Value::Vectors(vectors.iter().map(|vector| (*vector).into()).collect());
-        let placed = points_of_faces(self.points, &triangles);
-        let extent = bounds(placed.iter().map(|point| (*point, *point)));
+        let positions = points_of_faces(self.points, &triangles);
+        let extent = bounds(positions.iter().map(|point| (*point, *point)));
         let shown = if triangles.is_empty() { "invisible" } else { "inherited" };
         let [visibility, extent_attribute, counts, indices, points, velocities] =
             DECLARED.map(Attribute::declared);
@@ -84,7 +84,7 @@ impl<'a> MeshFrame<'a> {
             extent_attribute.at(frame, extent_value(extent)),
             counts.at(frame, Value::Ints(vec![3; triangles.len()])),
             indices.at(frame, Value::Ints(corners.iter().map(|vertex| *vertex as i32).collect())),
-            points.at(frame, rows(&placed)),
+            points.at(frame, rows(&positions)),
         ];
         if self.velocities.len() == self.points.len() {
             out.push(velocities.at(frame, rows(self.velocities)));

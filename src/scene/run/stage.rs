@@ -215,6 +215,9 @@ impl Report {
     }
 }
 
+/// Key of a frame's report: what its files hold, by kind, then by name of the prim or grid.
+pub(super) const CONTENTS: &str = "contents";
+
 /// The files of a frame while they are being written.
 pub struct FrameFiles<'a> {
     folder: &'a Path,

@@ -5,13 +5,10 @@ use std::path::Path;
 use super::done_frames::DoneFrames;
 use super::own_files::{OwnFiles, SHOT_USD};
 use super::pipeline::Pipeline;
-use super::stage::{Stage, Volume};
+use super::stage::{CONTENTS, Stage, Volume};
 use crate::error::Result;
 use crate::io::mesh::extension;
 use crate::io::usd::{self, Clips, Field, Holds, VolumeFile, VolumeFiles};
-
-/// Key of a frame's report: what its files hold, by kind, then by name of the prim or grid.
-pub(super) const CONTENTS: &str = "contents";
 
 /// Writes the description of the existing frames, with relative paths.
 ///
@@ -31,8 +28,7 @@ pub(super) fn write<'s>(
     for (stage, stored) in stages {
         for Volume { kind, prim: name, fields, is_guide } in stage.volumes() {
             let of_frame = |(frame, path)| volume_file(stored, (kind, fields), frame, path);
-            let files: Vec<VolumeFile> =
-                relative(stored, kind).into_iter().map(of_frame).collect::<Result<_>>()?;
+            let files: Vec<VolumeFile> = relative(stored, kind).into_iter().map(of_frame).collect();
             volumes.extend(
                 Some(VolumeFiles { name, fields, is_guide, files }).filter(|one| !one.files.is_empty()),
             );
@@ -53,15 +49,16 @@ pub(super) fn write<'s>(
     files.write(SHOT_USD, &usd::stage(&comment, time, &volumes, &clips)?)
 }
 
-/// A file of a volume, whose extent is in the frame's report; reports of frazil 0.1 have none.
+/// A file of a volume, whose extent is in the frame's report. Reports of frazil 0.1 have none, and one that is damaged (`check` says so)
+/// should not keep a run from its end.
 fn volume_file(
     stored: &DoneFrames,
     (kind, fields): (&str, &[Field]),
     frame: i32,
     path: String,
-) -> Result<VolumeFile> {
+) -> VolumeFile {
     type Box = [[f32; 3]; 2];
-    let report = stored.report(frame)?.unwrap_or_default();
+    let report = stored.report(frame).ok().flatten().unwrap_or_default();
     let grids = report.get(CONTENTS).and_then(|contents| contents.get(kind));
     let visible = fields.iter().filter(|field| matches!(field.holds, Holds::Distance | Holds::Density(_)));
     let extent = |field: &Field| grids?.get(field.grid)?.get("extent_m").cloned();
@@ -75,5 +72,5 @@ fn volume_file(
             })
         })
     });
-    Ok(VolumeFile { frame, path, is_empty: joined.is_none() && !known.is_empty(), extent: joined })
+    VolumeFile { frame, path, is_empty: joined.is_none() && !known.is_empty(), extent: joined }
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::shot_grains::folder;
 use crate::common::character::output;
+use crate::common::usda;
 use crate::program::{fails, frazil, kill_at, works};
 use frazil::geometry::DVec3;
 use frazil::vdb::AnyGrid;
@@ -62,7 +63,9 @@ fn mist_is_made_and_made_again_without_touching_base_and_grains() {
     let AnyGrid::Vectors(_) = read_any(&at.join("out/mist/mist.0010.vdb"), Some("vel")).unwrap() else {
         panic!("velocities are numbers")
     };
-    let stage = fs::read_to_string(at.join("out/shot.usda")).unwrap();
+    let [shot, samples] =
+        ["shot.usda", "shot.samples.usdc"].map(|name| usda::text(&at.join("out").join(name)));
+    let stage = shot + &samples;
     for words in ["def Volume \"mist\"", "rel field:density = </shot/mist/density>", "./mist/mist.0010.vdb"] {
         assert!(stage.contains(words), "no {words:?} in {stage}");
     }

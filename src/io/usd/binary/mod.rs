@@ -1,12 +1,12 @@
 //! A layer as a binary crate (.usdc), USD's own format: a third of the text's size or less, and read without parsing.
 //!
 //! A crate is a heap of values and six sections. *Tokens* are all words, each once. *Strings* are those that are text. A *field* is a name
-//! with a value, a *field set* the fields of a prim or attribute, a *path* its place in the tree, and a *spec* puts a path and a field set
-//! together. Values are 64-bit numbers that hold the type and either the value itself or its place on the heap. Integers are packed as
+//! with a value, a *field set* the fields of a prim or attribute, a *path* its position in the tree, and a *spec* puts a path and a field
+//! set together. Values are 64-bit numbers that hold the type and either the value itself or its offset in the file. Integers are packed as
 //! differences in 8, 16 or 32 bits, and then by LZ4.
 //!
-//! The format is that of OpenUSD's `pxr/usd/sdf/crateFile.h`, version 0.8: the first with all that is used here, so that programs with an
-//! older USD read it. (The crate `openusd` 0.6 writes children as arrays and packs arrays of 4 to 15 integers, both of which USD refuses.)
+//! The format is that of OpenUSD's `pxr/usd/sdf/crateFile.h`, version 0.8, and not a newer one, so that programs with an older USD read
+//! it. (The crate `openusd` 0.6 writes children as arrays and packs arrays of 4 to 15 integers, both of which USD refuses.)
 
 mod packing;
 
@@ -79,7 +79,7 @@ enum Type {
     TimeSamples = 46,
 }
 
-/// Flags of a value: an array, the value itself instead of its place, packed.
+/// Flags of a value: an array, the value itself instead of its offset, packed.
 const ARRAY: u64 = 1 << 63;
 const INLINE: u64 = 1 << 62;
 const PACKED: u64 = 1 << 61;
@@ -195,24 +195,24 @@ impl Writer {
     /// Names of children.
     fn names<'a>(&mut self, names: impl Iterator<Item = &'a str>) -> u64 {
         let tokens: Vec<u32> = names.map(|name| self.token(name)).collect();
-        let place = self.put(&(tokens.len() as u64).to_le_bytes());
+        let offset = self.put(&(tokens.len() as u64).to_le_bytes());
         tokens.iter().for_each(|token| _ = self.put(&token.to_le_bytes()));
-        placed(Type::TokenVector, place)
+        stored(Type::TokenVector, offset)
     }
 
-    /// Puts bytes on the heap; returns their place.
+    /// Puts bytes on the heap; returns their offset.
     fn put(&mut self, bytes: &[u8]) -> u64 {
-        let place = self.heap.len() as u64;
+        let offset = self.heap.len() as u64;
         self.heap.extend_from_slice(bytes);
-        place
+        offset
     }
 
     fn samples(&mut self, samples: Vec<(i32, Value)>) -> Result<u64> {
         // First the distance to the value of the times, which are before it; then the distance to the values, which follow at once.
-        let place = self.put(&[0; 8]);
+        let offset = self.put(&[0; 8]);
         let (frames, values): (Vec<i32>, Vec<Value>) = samples.into_iter().unzip();
         let times = self.array(Type::Double, &frames.into_iter().map(f64::from).collect::<Vec<f64>>());
-        let times_place = self.put(&times.to_le_bytes());
+        let times_offset = self.put(&times.to_le_bytes());
         self.put(&8u64.to_le_bytes());
         self.put(&(values.len() as u64).to_le_bytes());
         let first = self.put(&vec![0; 8 * values.len()]) as usize;
@@ -220,14 +220,14 @@ impl Writer {
             let value = self.value(value)?.to_le_bytes();
             self.heap[first + 8 * number..][..8].copy_from_slice(&value);
         }
-        self.heap[place as usize..][..8].copy_from_slice(&(times_place - place).to_le_bytes());
-        Ok(placed(Type::TimeSamples, place))
+        self.heap[offset as usize..][..8].copy_from_slice(&(times_offset - offset).to_le_bytes());
+        Ok(stored(Type::TimeSamples, offset))
     }
 
     fn value(&mut self, value: Value) -> Result<u64> {
         Ok(match value {
             Value::Float(value) => inline(Type::Float, value.to_bits().into()),
-            Value::Double(value) => placed(Type::Double, self.put(&value.to_le_bytes())),
+            Value::Double(value) => stored(Type::Double, self.put(&value.to_le_bytes())),
             Value::Token(text) => inline(Type::Token, self.token(&text).into()),
             Value::Text(text) => {
                 let token = self.token(&text);
@@ -235,7 +235,7 @@ impl Writer {
                 inline(Type::Text, self.strings.len() as u64 - 1)
             }
             Value::Asset(path) => inline(Type::Asset, self.token(&path).into()),
-            Value::Vector(parts) => placed(Type::Float3, self.put(&parts.map(f32::to_le_bytes).concat())),
+            Value::Vector(parts) => stored(Type::Float3, self.put(&parts.map(f32::to_le_bytes).concat())),
             Value::Bools(values) => self.array(Type::Bool, &values),
             Value::Ints(values) => self.integers(Type::Int, &values),
             Value::Uints(values) => self.integers(Type::Uint, &values),
@@ -254,21 +254,21 @@ impl Writer {
 
     fn array<T: ToBytes>(&mut self, class: Type, values: &[T]) -> u64 {
         if values.is_empty() {
-            return placed(class, 0) | ARRAY;
+            return stored(class, 0) | ARRAY;
         }
-        let place = self.put(&(values.len() as u64).to_le_bytes());
+        let offset = self.put(&(values.len() as u64).to_le_bytes());
         self.heap.reserve(size_of_val(values));
         values.iter().for_each(|value| value.put(&mut self.heap));
-        placed(class, place) | ARRAY
+        stored(class, offset) | ARRAY
     }
 
     fn integers<T: Integer>(&mut self, class: Type, values: &[T]) -> u64 {
         if values.len() < MIN_PACKED {
             return self.array(class, values);
         }
-        let place = self.put(&(values.len() as u64).to_le_bytes());
+        let offset = self.put(&(values.len() as u64).to_le_bytes());
         put_packed(&mut self.heap, values);
-        placed(class, place) | ARRAY | PACKED
+        stored(class, offset) | ARRAY | PACKED
     }
 
     /// Floats of which few differ, such as widths that are all the same, as a table of these and an index for each.
@@ -289,12 +289,12 @@ impl Writer {
         if values.len() < MIN_PACKED {
             return self.array(Type::Float, values);
         }
-        let place = self.put(&(values.len() as u64).to_le_bytes());
+        let offset = self.put(&(values.len() as u64).to_le_bytes());
         self.heap.push(b't');
         (table.len() as u32).put(&mut self.heap);
         table.iter().for_each(|value| value.put(&mut self.heap));
         put_packed(&mut self.heap, &indices);
-        placed(Type::Float, place) | ARRAY | PACKED
+        stored(Type::Float, offset) | ARRAY | PACKED
     }
 
     /// The file, whose paths are those below `root`.
@@ -344,11 +344,11 @@ impl Writer {
         });
         let contents_at = out.len() as u64;
         (contents.len() as u64).put(&mut out);
-        for (name, place) in contents {
+        for (name, extent) in contents {
             let mut padded = [0; 16];
             padded[..name.len()].copy_from_slice(name.as_bytes());
             out.extend_from_slice(&padded);
-            place.put(&mut out);
+            extent.put(&mut out);
         }
         let header = [*IDENTIFICATION, VERSION, contents_at.to_le_bytes()].concat();
         out[..header.len()].copy_from_slice(&header);
@@ -390,9 +390,9 @@ fn inline(class: Type, bits: u64) -> u64 {
     INLINE | (class as u64) << 48 | bits
 }
 
-/// A value at a place of the file.
-fn placed(class: Type, place: u64) -> u64 {
-    (class as u64) << 48 | place
+/// A value at an offset in the file.
+fn stored(class: Type, offset: u64) -> u64 {
+    (class as u64) << 48 | offset
 }
 
 fn unwritten(what: &str) -> Error {
