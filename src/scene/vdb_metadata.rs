@@ -1,4 +1,4 @@
-//! Metadata of .vdb files about their frame, and what their grids hold.
+//! Metadata of .vdb files about their frame, and the contents of their grids.
 
 use super::Scene;
 use crate::geometry::DVec3;
@@ -20,7 +20,7 @@ pub(super) fn metadata(scene: &Scene, frame: i32, made_from: &str) -> Vec<(Strin
     ]
 }
 
-/// What grids hold, by their names, for the frame's report and `shot.usda`.
+/// The contents of grids, for the frame's report and `shot.usda`.
 pub(super) fn contents(grids: &[&FloatGrid]) -> ContentsByName {
     let of = |grid: &&FloatGrid| (grid.name(), Contents { extent: extent(grid), ..Contents::default() });
     grids.iter().map(of).collect()

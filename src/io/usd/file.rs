@@ -1,4 +1,4 @@
-//! A USD file: its format, its units, and what it holds.
+//! A USD file: its format, units and contents.
 
 use super::layer::{Attribute, Layer, Value};
 use super::{binary, text};
@@ -35,16 +35,16 @@ impl Format {
     }
 }
 
-/// A layer that was made, and what is in it.
+/// A layer with a summary of its contents.
 pub struct File {
     pub(super) layer: Layer,
     pub(super) contents: ContentsByName,
 }
 
-/// What prims or grids hold, with their names.
+/// Contents of prims or grids, with their names.
 pub type ContentsByName = Vec<(String, Contents)>;
 
-/// What a prim or a grid holds at a frame.
+/// The contents of a prim or a grid at a frame.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Contents {
     /// Count of points, if it has any kind of points.
@@ -56,7 +56,7 @@ pub struct Contents {
 }
 
 impl File {
-    /// What its prims hold, by name.
+    /// The contents of its prims.
     pub fn contents(&self) -> &ContentsByName {
         &self.contents
     }

@@ -57,67 +57,52 @@ pub enum Shading {
 const CREASE: f64 = 40.0;
 
 impl<'a> MeshFrame<'a> {
-    /// A mesh with what it carries.
+    /// A mesh with the data that it carries.
     pub fn of(name: &'a str, mesh: &'a TriMesh, carried: &Carried<'a>, shading: Shading) -> Self {
         let Carried { velocities, uvs, arrays } = *carried;
         let (points, triangles) = (&mesh.positions[..], &mesh.triangles[..]);
         Self { name, points, velocities, triangles, uvs, arrays, shading }
     }
 
-    /// Its attributes at a frame, and what they hold.
+    /// Its attributes at a frame, and their contents.
     fn attributes(&self, frame: i32) -> (Vec<Attribute>, Contents) {
         let kept = self.faces_with_area();
         let faces = kept.as_deref().map_or(Faces::All, Faces::Only);
-        let triangles: Vec<[u32; 3]> = match faces {
-            Faces::All => self.triangles.to_vec(),
-            Faces::Only(kept) => kept.iter().map(|face| self.triangles[*face]).collect(),
-        };
-        let corners = triangles.as_flattened();
-        let rows = |vectors: &[Vec3]| Value::Vectors(vectors.iter().map(|vector| (*vector).into()).collect());
-        let positions = points_of_faces(self.points, &triangles);
-        let extent = bounds(positions.iter().map(|point| (*point, *point)));
+        let triangles = faces.of_faces(self.triangles);
+        let (points, triangle_count) = (points_of_faces(self.points, &triangles), triangles.len());
+        let extent = bounds(points.iter().map(|point| (*point, *point)));
         let shown = if triangles.is_empty() { "invisible" } else { "inherited" };
-        let [visibility, extent_attribute, counts, indices, points, velocities] =
-            DECLARED.map(Attribute::declared);
-        let mut out = vec![
-            visibility.at(frame, Value::Token(shown.into())),
-            extent_attribute.at(frame, extent_value(extent)),
-            counts.at(frame, Value::Ints(vec![3; triangles.len()])),
-            indices.at(frame, Value::Ints(corners.iter().map(|vertex| *vertex as i32).collect())),
-            points.at(frame, rows(&positions)),
+        let corners = triangles.as_flattened().iter().map(|vertex| *vertex as i32);
+        let values = [
+            Value::Token(shown.into()),
+            extent_value(extent),
+            Value::Ints(vec![3; triangle_count]),
+            Value::Ints(corners.collect()),
+            rows(&points),
+            rows(self.velocities),
         ];
-        if self.velocities.len() == self.points.len() {
-            out.push(velocities.at(frame, rows(self.velocities)));
-        }
-        if let Some(uvs) = self.uvs {
-            let [st, seams] = texture_coordinates(uvs);
-            out.extend(st.map(|st| st.at(frame, Value::Pairs(uvs.coordinates.clone()))));
-            if let (Some(seams), Some(corners)) = (seams, &uvs.corners) {
-                let corner = |corner: usize| corners[corner] as i32;
-                let values = match faces {
-                    Faces::All => (0..corners.len()).map(corner).collect(),
-                    Faces::Only(kept) => kept
-                        .iter()
-                        .flat_map(|face| [3 * face, 3 * face + 1, 3 * face + 2])
-                        .map(corner)
-                        .collect(),
-                };
-                out.push(seams.at(frame, Value::Ints(values)));
-            }
-        }
+        let moves = self.velocities.len() == self.points.len();
+        let own = DECLARED.into_iter().zip(values).filter(|((_, name), _)| moves || *name != VELOCITIES);
+        let own = own.map(|(declared, value)| Attribute::declared(declared).at(frame, value));
+        let uvs = self.uvs.into_iter().flat_map(|uvs| uv_attributes(uvs, faces, frame));
+        let normals = self.normals(&triangles, frame);
+        let primvars = primvars::attributes(self.arrays, faces, frame);
+        let out = own.chain(uvs).chain(normals).chain(primvars).collect();
+        (out, Contents { points: Some(self.points.len()), faces: Some(triangle_count), extent })
+    }
+
+    /// The normals of some of its triangles at a frame.
+    fn normals(&self, triangles: &[[u32; 3]], frame: i32) -> impl Iterator<Item = Attribute> {
         let (units, indices) = match self.shading {
-            Shading::Smooth => (normals::smooth(self.points, &triangles), Vec::new()),
-            Shading::Creased => normals::creased(self.points, &triangles, libm::cos(CREASE.to_radians())),
+            Shading::Smooth => (normals::smooth(self.points, triangles), Vec::new()),
+            Shading::Creased => normals::creased(self.points, triangles, libm::cos(CREASE.to_radians())),
         };
         // A point of no face has none, and USD wants a direction.
-        let unit = |normal: &Vec3| if *normal == Vec3::zeros() { Vec3::y() } else { *normal };
-        let units = Value::Vectors(units.iter().map(|normal| unit(normal).into()).collect());
+        let unit = |normal: Vec3| if normal == Vec3::zeros() { Vec3::y() } else { normal };
+        let units: Vec<Vec3> = units.into_iter().map(unit).collect();
         let indices = Value::Ints(indices.into_iter().map(|index| index as i32).collect());
         let attributes = self.shading.attributes().into_iter().flatten();
-        out.extend(attributes.zip([units, indices]).map(|(attribute, value)| attribute.at(frame, value)));
-        out.extend(primvars::attributes(self.arrays, faces, frame));
-        let (points, faces) = (Some(self.points.len()), Some(triangles.len()));
-        (out, Contents { points, faces, extent })
+        attributes.zip([rows(&units), indices]).map(move |(attribute, value)| attribute.at(frame, value))
     }
 
     /// The faces that have an area; none if all have.
@@ -205,6 +190,19 @@ const DECLARED: [(&str, &str); 6] = [
 ];
 
 const VELOCITIES: &str = "velocities";
+
+fn rows(vectors: &[Vec3]) -> Value {
+    Value::Vectors(vectors.iter().map(|vector| (*vector).into()).collect())
+}
+
+/// Texture coordinates at a frame.
+fn uv_attributes(uvs: &Uvs, faces: Faces<'_>, frame: i32) -> impl Iterator<Item = Attribute> {
+    let indices = uvs.corners.as_deref().map_or(Vec::new(), |corners| faces.of_corners(corners));
+    let indices = Value::Ints(indices.into_iter().map(|index| index as i32).collect());
+    let values = [Value::Pairs(uvs.coordinates.clone()), indices];
+    let attributes = texture_coordinates(uvs).into_iter().flatten();
+    attributes.zip(values).map(move |(attribute, value)| attribute.at(frame, value))
+}
 
 /// Texture coordinates: the values, per vertex or per corner of faces, and, if there are seams, an index for each corner.
 fn texture_coordinates(uvs: &Uvs) -> [Option<Attribute>; 2] {

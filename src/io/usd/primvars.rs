@@ -48,20 +48,16 @@ struct Group<'a> {
 impl Group<'_> {
     fn values(&self, faces: Faces<'_>) -> Value {
         let part = |array: &MeshArray| -> Vec<f64> {
-            let whole = if self.is_fraction && array.number == Number::U8 { 255.0 } else { 1.0 };
-            let fraction =
-                |value: f64| if self.is_fraction { f64::from(value as f32 / whole) } else { value };
-            let values = array.values.iter().map(|value| fraction(*value));
-            match (array.on, faces) {
-                (On::Vertices, _) | (_, Faces::All) => values.collect(),
-                (On::Faces, Faces::Only(kept)) => {
-                    kept.iter().map(|face| fraction(array.values[*face])).collect()
-                }
-                (On::Corners, Faces::Only(kept)) => {
-                    let corners = kept.iter().flat_map(|face| [3 * face, 3 * face + 1, 3 * face + 2]);
-                    corners.map(|corner| fraction(array.values[corner])).collect()
-                }
+            let whole = if array.number == Number::U8 { 255.0 } else { 1.0 };
+            let mut values = match array.on {
+                On::Vertices => array.values.clone(),
+                On::Faces => faces.of_faces(&array.values),
+                On::Corners => faces.of_corners(&array.values),
+            };
+            if self.is_fraction {
+                values.iter_mut().for_each(|value| *value = f64::from(*value as f32 / whole));
             }
+            values
         };
         let parts: Vec<Vec<f64>> = self.parts.iter().map(|array| part(array)).collect();
         match &parts[..] {
@@ -93,6 +89,26 @@ impl Group<'_> {
 pub(in crate::io) enum Faces<'a> {
     All,
     Only(&'a [usize]),
+}
+
+impl Faces<'_> {
+    /// Those of some values, one for each face, that belong to these faces.
+    pub fn of_faces<T: Copy>(self, values: &[T]) -> Vec<T> {
+        match self {
+            Self::All => values.to_vec(),
+            Self::Only(kept) => kept.iter().map(|face| values[*face]).collect(),
+        }
+    }
+
+    /// As [`Faces::of_faces`], of values for the three corners of each face.
+    pub fn of_corners<T: Copy>(self, values: &[T]) -> Vec<T> {
+        match self {
+            Self::All => values.to_vec(),
+            Self::Only(kept) => {
+                kept.iter().flat_map(|face| &values[3 * face..3 * face + 3]).copied().collect()
+            }
+        }
+    }
 }
 
 /// The primvar planned for some arrays.

@@ -146,7 +146,7 @@ fn value(out: &mut String, value: &Value) {
         Value::Token(text) | Value::Text(text) => out.push_str(&quoted(text)),
         Value::Asset(path) => out.push_str(&asset(path)),
         Value::Vector(parts) => tuple(out, *parts, float),
-        // USD's text has no words for truth in arrays that older programs read: they are numbers.
+        // As numbers, as USD itself writes them.
         Value::Bools(values) => list(out, values, |out, value| display(out, u8::from(*value))),
         Value::Ints(values) => list(out, values, |out, value| display(out, value)),
         Value::Uints(values) => list(out, values, |out, value| display(out, value)),

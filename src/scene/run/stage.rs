@@ -215,7 +215,7 @@ impl Report {
     }
 }
 
-/// Key of a frame's report: what its files hold, by kind, then by name of the prim or grid.
+/// Key of a frame's report: the contents of its files, by kind, then by name of the prim or grid.
 pub(super) const CONTENTS: &str = "contents";
 
 /// The files of a frame while they are being written.
@@ -229,7 +229,7 @@ pub struct FrameFiles<'a> {
     pub made_from: &'a str,
     files: Vec<Written>,
     state: Option<Written>,
-    /// What the files hold, for the report: by kind, then by name of the prim or grid.
+    /// Contents of the files, for the report: by kind, then by name of the prim or grid.
     contents: Map<String, Value>,
 }
 
@@ -276,7 +276,7 @@ impl<'a> FrameFiles<'a> {
         self.save(kind, usd::BINARY, &file.bytes(usd::Format::Binary)?)
     }
 
-    /// Notes what the files of a kind hold, by name of the prim or grid, for the frame's report.
+    /// Adds the contents of the files of a kind to the frame's report.
     pub(in crate::scene) fn describe(&mut self, kind: &str, contents: &[(String, usd::Contents)]) {
         let of_kind = self.contents.entry(kind).or_insert_with(|| Map::new().into());
         let Value::Object(of_kind) = of_kind else { unreachable!("an object was inserted") };
@@ -301,7 +301,7 @@ impl<'a> FrameFiles<'a> {
         Ok(())
     }
 
-    /// The files that were written, the exact state, and what the files hold.
+    /// The files that were written, the exact state, and the contents of the files.
     pub(super) fn into_written(self) -> (Vec<Written>, Option<Written>, Map<String, Value>) {
         (self.files, self.state, self.contents)
     }

@@ -34,7 +34,7 @@ pub(super) fn put_packed<T: Integer>(out: &mut Vec<u8>, values: &[T]) {
     put_compressed(out, &packed);
 }
 
-/// The most frequent number, the least of several; 0 of none.
+/// The most frequent number, the smallest if there are several; 0 without any.
 fn most_frequent(numbers: &[i64]) -> i64 {
     let mut sorted = numbers.to_vec();
     sorted.sort_unstable();
@@ -42,7 +42,7 @@ fn most_frequent(numbers: &[i64]) -> i64 {
     runs.max().map_or(0, |(_, std::cmp::Reverse(number))| number)
 }
 
-/// What an array of a crate holds.
+/// Elements of arrays.
 pub(super) trait ToBytes {
     fn put(&self, out: &mut Vec<u8>);
 }

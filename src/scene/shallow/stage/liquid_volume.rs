@@ -26,7 +26,7 @@ pub(in crate::scene::shallow) fn of_shot(kind: &'static str) -> Volume {
     Volume { kind, prim: "liquid_volume", fields: FIELDS, is_guide: false }
 }
 
-/// The bytes of a frame's .vdb file, and what it holds.
+/// The bytes of a frame's .vdb file, and its contents.
 ///
 /// `made_from` is the hash of everything that the frame was made from.
 ///

@@ -52,7 +52,7 @@ pub struct State<'a> {
 pub struct FrameData {
     surface: LiquidMesh,
     state: Vec<u8>,
-    /// A .vdb file, and what it holds.
+    /// A .vdb file, and its contents.
     volume: Option<(Vec<u8>, ContentsByName)>,
     /// The terrain and its stains.
     terrain: Option<(TriMesh, Vec<f32>)>,

@@ -58,7 +58,7 @@ pub struct Packed {
     kind: &'static str,
     extension: &'static str,
     bytes: Vec<u8>,
-    /// What it holds, for the report.
+    /// Its contents, for the report.
     contents: usd::ContentsByName,
 }
 
