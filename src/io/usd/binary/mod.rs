@@ -477,6 +477,18 @@ mod tests {
         assert_eq!(data.spec_paths().len(), 2 + 2 * (2 + values().len()));
     }
 
+    /// What OpenUSD requires and the library `openusd` does not: see `crateDataTypes.h` and `MinCompressedArraySize` in `crateFile.cpp`.
+    #[test]
+    fn children_are_vectors_and_arrays_are_packed_from_16_integers_on() {
+        let mut writer = Writer::default();
+        let children = writer.names(["hero", "other"].into_iter());
+        assert_eq!((children >> 48 & 0xFF, children & (ARRAY | INLINE | PACKED)), (41, 0));
+        for (count, is_packed) in [(4, false), (15, false), (16, true)] {
+            let values = writer.integers(Type::Int, &vec![7; count]);
+            assert_eq!((values & ARRAY != 0, values & PACKED != 0), (true, is_packed), "{count}");
+        }
+    }
+
     #[test]
     fn what_is_only_written_as_text_is_an_error() {
         let mut prim = Prim::def("Mesh", "hero");
