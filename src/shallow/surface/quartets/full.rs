@@ -73,76 +73,95 @@ pub(in crate::shallow::surface) fn find_full(liquid: LiquidColumns<'_>, found: &
 #[inline(always)]
 fn find_full_spans(liquid: LiquidColumns<'_>, found: &mut Found) {
     let columns = liquid.columns;
-    let arrays = [liquid.depth, columns.bases(), columns.ceilings(), columns.unders()];
-    // No position follows the last strip: its arrays are padded.
-    let last = columns.strips().len().saturating_sub(1);
-    let mut ends = [[0; STRIP + 1]; 4];
-    for (end, numbers) in ends.iter_mut().zip(arrays) {
-        end[..STRIP].copy_from_slice(numbers.last_chunk::<STRIP>().unwrap_or(&[0; STRIP]));
-    }
+    let heights = PaddedHeights::of(liquid);
     for at in 0..found.spans.len() {
         let span = found.spans[at];
-        let (first, end) = (span.first, span.len - 1);
-        let none = found.states.len() - 1;
-        let corners = Corners::of(columns, found, &span);
-        let [mut west, mut north_west] = [corners.west, corners.north_west].map(|slot| found.states[slot]);
-        let mut wet = found.states[first].wet;
-        let mut wet_south = found.states[found.slot(neighbour(span.south))].wet;
+        let ends = Ends::of(columns, found, &span);
+        let [mut west, mut north_west] = [ends.west, ends.north_west].map(|slot| found.states[slot]);
+        let mut wet = [span.first, found.slot(neighbour(span.south))].map(|slot| found.states[slot].wet);
         for step in 0..span.len {
-            let strip = first + step;
-            let wet_east = found.states[if step == end { corners.east } else { strip + 1 }].wet;
-            let mut wet_south_east = 0;
-            let (mut full, mut turned) = (0, 0);
-            if let Some(south) = neighbour(span.south).map(|south| south + step) {
-                wet_south_east = found.states[if step == end { corners.south_east } else { south + 1 }].wet;
-                let wets = [wet, from_east(wet, wet_east), wet_south, from_east(wet_south, wet_south_east)];
-                let any = wets[0] | wets[1] | wets[2] | wets[3];
-                if any != 0 {
-                    let windows_south = if south == last {
-                        windows(ends.each_ref().map(|end| end.as_slice()), 0)
-                    } else {
-                        windows(arrays, south)
-                    };
-                    let [linked, max] = compare(windows(arrays, strip), windows_south);
-                    full = linked & any;
-                    if step == end && (corners.east == none || corners.south_east == none) {
-                        full &= 0x7fff;
-                    }
-                    turned = full & choose(wets, max);
-                    found.full_triangles += 2 * count(full) as usize;
-                }
-            }
-            let north = found.states[neighbour(span.north).map_or(none, |north| north + step)];
+            let strip = span.first + step;
+            let south = neighbour(span.south).map(|south| south + step);
+            let north = found.states[neighbour(span.north).map_or(ends.none, |north| north + step)];
+            let wet_east = ends.slots_to_the_east(&span, step).map(|slot| found.states[slot].wet);
+            let [full, turned] = south.map_or([0; 2], |south| {
+                let corners =
+                    [wet[0], from_east(wet[0], wet_east[0]), wet[1], from_east(wet[1], wet_east[1])];
+                heights.full_quartets([strip, south], corners, ends.whole_quartets(&span, step))
+            });
+            found.full_triangles += 2 * count(full) as usize;
             let covered =
                 [full, from_west(full, west.full), north.full, from_west(north.full, north_west.full)];
             let state = &mut found.states[strip];
             (state.full, state.turned) = (full, turned);
             state.used = covered[0] | covered[1] | covered[2] | covered[3];
             state.sides = [
-                (covered[1] | covered[3]) & from_west(wet, west.wet),
-                (covered[0] | covered[2]) & from_east(wet, wet_east),
+                (covered[1] | covered[3]) & from_west(wet[0], west.wet),
+                (covered[0] | covered[2]) & from_east(wet[0], wet_east[0]),
                 (covered[2] | covered[3]) & north.wet,
-                (covered[0] | covered[1]) & wet_south,
+                (covered[0] | covered[1]) & wet[1],
             ];
-            west = State { wet, full, ..west };
-            north_west = north;
-            if wet & !(covered[0] & covered[1] & covered[2] & covered[3]) != 0 {
+            if wet[0] & !(covered[0] & covered[1] & covered[2] & covered[3]) != 0 {
                 add_odd(columns, found, strip, covered);
             }
-            (wet, wet_south) = (wet_east, wet_south_east);
+            west = State { wet: wet[0], full, ..west };
+            (north_west, wet) = (north, wet_east);
         }
     }
 }
 
+/// Depths, bases, ceilings and undersides, where the last strip too is followed by a position.
+struct PaddedHeights<'a> {
+    arrays: [&'a [i32]; 4],
+    last: usize,
+    /// The last strip's.
+    ends: [[i32; STRIP + 1]; 4],
+}
+
+impl<'a> PaddedHeights<'a> {
+    fn of(liquid: LiquidColumns<'a>) -> Self {
+        let columns = liquid.columns;
+        let arrays = [liquid.depth, columns.bases(), columns.ceilings(), columns.unders()];
+        let mut ends = [[0; STRIP + 1]; 4];
+        for (end, numbers) in ends.iter_mut().zip(arrays) {
+            end[..STRIP].copy_from_slice(numbers.last_chunk::<STRIP>().unwrap_or(&[0; STRIP]));
+        }
+        Self { arrays, last: columns.strips().len().saturating_sub(1), ends }
+    }
+
+    /// The full quartets between a strip and the one to the south, and which of these are divided from north-east to south-west. `wet`:
+    /// the wet corners of each quartet (north-west, north-east, south-west, south-east); `whole`: the quartets with four columns.
+    #[inline(always)]
+    fn full_quartets(&self, [strip, south]: [usize; 2], wet: [u16; 4], whole: u16) -> [u16; 2] {
+        let any = wet[0] | wet[1] | wet[2] | wet[3];
+        if any == 0 {
+            return [0; 2];
+        }
+        // The strip itself is not the last one: the one to the south comes later.
+        let windows_south = if south == self.last {
+            windows(self.ends.each_ref().map(|end| end.as_slice()), 0)
+        } else {
+            windows(self.arrays, south)
+        };
+        let [linked, max] = compare(windows(self.arrays, strip), windows_south);
+        let full = linked & any & whole;
+        [full, full & choose(wet, max)]
+    }
+}
+
 /// Indices in `states` of strips at the ends of a span, in its own row and in those to the north and south.
-struct Corners {
+struct Ends {
     west: usize,
     east: usize,
     north_west: usize,
     south_east: usize,
+    /// The first to the south.
+    south: Option<usize>,
+    /// That of no strip.
+    none: usize,
 }
 
-impl Corners {
+impl Ends {
     fn of(columns: &Columns, found: &Found, span: &Span) -> Self {
         let end = span.len - 1;
         Self {
@@ -150,6 +169,25 @@ impl Corners {
             east: found.slot(columns.east(span.first + end)),
             north_west: found.slot(neighbour(span.north).and_then(|north| columns.west(north))),
             south_east: found.slot(neighbour(span.south).and_then(|south| columns.east(south + end))),
+            south: neighbour(span.south),
+            none: found.states.len() - 1,
+        }
+    }
+
+    /// The quartets of the strip at `step` with columns to the east: all but one at the end of a layer.
+    #[inline(always)]
+    fn whole_quartets(&self, span: &Span, step: usize) -> u16 {
+        let lacks_east = self.east == self.none || self.south_east == self.none;
+        if step + 1 == span.len && lacks_east { u16::MAX >> 1 } else { u16::MAX }
+    }
+
+    /// The strip to the east of the one at `step`, and the one to the south of that.
+    #[inline(always)]
+    fn slots_to_the_east(&self, span: &Span, step: usize) -> [usize; 2] {
+        if step + 1 == span.len {
+            [self.east, self.south_east]
+        } else {
+            [span.first + step + 1, self.south.map_or(self.none, |south| south + step + 1)]
         }
     }
 }
