@@ -33,10 +33,10 @@ Examples:
   frazil convert grains.%04d.vdb grains.%04d.usda --frames 1-2
   frazil convert grains.0001.vdb drop.0001.bgeo && frazil convert drop.0001.bgeo drop.ply --up z")]
 pub struct Args {
-    /// Mesh (.obj, .ply, .stl), a sequence of them (body.%04d.obj), a character (.glb, .gltf), or points (.vdb,
-    /// .bgeo, .vtk, .vtu, .xyz, .ply).
+    /// Mesh (.obj, .ply, .stl, .usdc), a sequence of them (body.%04d.obj), a character (.glb, .gltf), or points (.vdb,
+    /// .bgeo, .vtk, .vtu, .xyz, .ply, .usdc).
     input: PathBuf,
-    /// Mesh (.obj, .ply, .stl, .usda) or points (.vdb, .ply, .usda, .bgeo, .xyz), or their pattern.
+    /// Mesh (.obj, .ply, .stl, .usda, .usdc) or points (.vdb, .ply, .usda, .usdc, .bgeo, .xyz), or their pattern.
     output: PathBuf,
     /// Frames of a sequence or a character.
     #[arg(long, value_name = "A-B|A-BxN", allow_hyphen_values = true)]
@@ -218,26 +218,31 @@ impl Losses<'_> {
         }
         // There are warnings about these above.
         const HAVE_OWN_WARNING: [&str; 7] = ["vx", "vy", "vz", "red", "green", "blue", "alpha"];
-        if extension(input) != "ply" {
+        let from = extension(input);
+        if from != "ply" && usd::Format::of(&from).is_none() {
             return Ok(());
         }
         let arrays = io::mesh::read_any(input)?.into_detailed().arrays;
-        let is_lost = |array: &&MeshArray| match to.as_str() {
-            "ply" | "usda" => self.is_sequence && array.on == On::Corners,
-            _ => !HAVE_OWN_WARNING.contains(&&*array.name),
+        let holds_arrays = to == "ply" || is_usd;
+        let is_lost = |array: &&MeshArray| {
+            if holds_arrays {
+                self.is_sequence && array.on == On::Corners
+            } else {
+                !HAVE_OWN_WARNING.contains(&&*array.name)
+            }
         };
         let names: Vec<&str> = arrays.iter().filter(is_lost).map(|array| &array.name[..]).collect();
         if !names.is_empty() {
             log::warn!("{}: arrays are not carried over: {}", input.display(), names.join(", "));
         }
-        if to == "usda" && self.is_sequence && vectors(&arrays, VELOCITY).is_some() {
+        if is_usd && self.is_sequence && vectors(&arrays, VELOCITY).is_some() {
             log::warn!(
                 "{}: its velocities are replaced by those computed from each frame to the next",
                 input.display()
             );
         }
         let vectors = vector_stems(&arrays);
-        if !vectors.is_empty() && !self.keeps_space && ["ply", "usda"].contains(&to.as_str()) {
+        if !vectors.is_empty() && !self.keeps_space && holds_arrays {
             log::warn!(
                 "{}: these vectors keep their axes and units: {}",
                 input.display(),
@@ -409,7 +414,7 @@ impl Args {
             return Ok(Vec::new());
         }
         let mut arrays = io::mesh::read_any(&input)?.into_detailed().arrays;
-        if extension(output) == "usda" {
+        if usd::Format::of(&extension(output)).is_some() {
             name_velocities(&mut arrays);
         }
         // Velocities are not converted to another space.

@@ -38,10 +38,9 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
             #[cfg(not(feature = "vdb"))]
             "vdb" => super::needs_openvdb(path),
             _ if is_gltf(path) => character(path, &args.origin),
-            "ply" if io::particles::ply::holds_points(path).is_ok_and(|yes| yes) => {
+            _ if io::particles::holds_points(path).is_ok_and(|yes| yes) => {
                 super::points::info(path, args.origin.at)
             }
-            _ if super::points::is_point_file(path) => super::points::info(path, args.origin.at),
             _ => mesh(path, &args.origin),
         };
         all.push(json!({ "file": path.display().to_string(), "holds": holds.or_refuse()? }));

@@ -7,7 +7,6 @@ use frazil::geometry::{DVec3, Points};
 use frazil::io::files::atomic;
 use frazil::io::files::sequence::Pattern;
 use frazil::io::mesh::extension;
-use frazil::io::particles::ply;
 use frazil::io::particles::{self, ParticleData};
 use frazil::io::usd::{Format, points};
 use frazil::motion::Space;
@@ -60,18 +59,20 @@ pub fn info(path: &Path, origin: DVec3) -> Result<Vec<Value>> {
     Ok(vec![Value::Object(entry)])
 }
 
-/// Whether a file's extension is one of point files; .ply does not count, as it may hold a mesh.
+/// Whether a file's extension is one of point files; .ply and USD do not count, as they may hold a mesh.
 pub fn is_point_file(path: &Path) -> bool {
-    let extension = extension(path);
-    extension == "vdb" || extension != "ply" && particles::has_extension_of_particles(path)
+    let is_particles = particles::has_extension_of_particles(path) && !particles::may_hold_mesh(path);
+    extension(path) == "vdb" || is_particles
 }
 
-/// Whether `frazil convert` converts points: a file of points in or out, or a .ply without faces.
+/// Whether `frazil convert` converts points: a file of points in or out, or a .ply or USD file without faces.
 pub fn converts_points(input: &Path, output: &Path, frames: Option<&FrameChoice>) -> Result<bool> {
     if [input, output].into_iter().any(is_point_file) {
         return Ok(true);
     }
-    if extension(input) != "ply" || (extension(output) != "ply" && Format::of(&extension(output)).is_none()) {
+    let may_be_points =
+        |path: &Path| particles::may_hold_mesh(path) || Format::of(&extension(path)).is_some();
+    if !particles::may_hold_mesh(input) || !may_be_points(output) {
         return Ok(false);
     }
     let first = match (Pattern::parse(input), frames) {
@@ -81,7 +82,7 @@ pub fn converts_points(input: &Path, output: &Path, frames: Option<&FrameChoice>
         }
         _ => Some(input.to_path_buf()).filter(|path| path.is_file()),
     };
-    first.map_or(Ok(false), |first| ply::holds_points(&first))
+    first.map_or(Ok(false), |first| particles::holds_points(&first))
 }
 
 /// Points of a file, and whether their voxels have a size from the file or the user, rather than an arbitrary one.
@@ -116,7 +117,7 @@ impl Conversion<'_> {
             return Err(Failure::of_file(self.output, what));
         }
         if extension(self.input) != "vdb" && !particles::has_extension_of_particles(self.input) {
-            let what = "points are read from .vdb, .bgeo, .vtk, .vtu, .xyz and .ply files";
+            let what = "points are read from .vdb, .bgeo, .vtk, .vtu, .xyz, .ply and .usdc files";
             return Err(Failure::of_file(self.input, what));
         }
         if is_sequence && self.frames.is_none() {

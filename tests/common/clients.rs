@@ -98,6 +98,13 @@ pub fn usd_is_whole(python: &Path, folder: &Path) -> Result<String, String> {
     run(command)
 }
 
+/// usd-core writes binary files of a mesh, of points, and of a mesh with a transform to a folder.
+pub fn usd_writes(python: &Path, folder: &Path) -> Result<String, String> {
+    let mut command = Command::new(python);
+    command.arg(root().join("tests/clients/write_usd.py")).arg(folder);
+    run(command)
+}
+
 /// usd-core reads the arrays of a mesh at a frame and finds those of a file that tests/clients/primvars.py describes.
 pub fn usd_reads_arrays(
     python: &Path,

@@ -59,6 +59,7 @@ mod io {
     mod particles;
     mod particles_damage;
     mod text_variants;
+    mod usd;
     mod uvs;
 }
 mod motion {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::cli::preview::parts::{Folder, LiquidLook, Part};
 use frazil::geometry::TriMesh;
-use frazil::io::mesh;
+use frazil::io::mesh::{self, extension};
 use frazil::scene::Scene;
 use frazil::scene::run::DoneFrames;
 use frazil::scene::shallow::Surroundings;
@@ -23,9 +23,14 @@ pub struct ShallowFolder {
     scene: Option<Scene>,
     /// The terrain, if it is the same in all frames and was read.
     terrain: Option<TriMesh>,
+    /// The extension of the files that are drawn.
+    extension: &'static str,
     /// The existing frames, ascending; at least one.
     frames: Vec<i32>,
 }
+
+/// The extensions of files that can be drawn, the best first.
+const DRAWN: [&str; 2] = ["ply", "usdc"];
 
 impl ShallowFolder {
     /// Opens a folder; none if it has no frames of a liquid.
@@ -35,11 +40,14 @@ impl ShallowFolder {
     pub fn open(folder: &Path) -> Result<Option<Self>> {
         let liquid = DoneFrames::read(folder, LIQUID)?;
         let all = liquid.files(LIQUID);
-        let frames: Vec<i32> =
-            all.into_iter().filter(|(_, path)| path.ends_with(".ply")).map(|(frame, _)| frame).collect();
-        if frames.is_empty() {
-            return Ok(None);
-        }
+        let frames_of = |kind: &'static str| {
+            let files = all.iter().filter(|(_, path)| extension(path.as_ref()) == kind);
+            let frames: Vec<i32> = files.map(|(frame, _)| *frame).collect();
+            (!frames.is_empty()).then_some((kind, frames))
+        };
+        // A folder whose kind of files was changed has frames of both: the kind with the most is drawn.
+        let drawn = DRAWN.into_iter().rev().filter_map(frames_of).max_by_key(|(_, frames)| frames.len());
+        let Some((extension, frames)) = drawn else { return Ok(None) };
         let scene = match Scene::read(&folder.join("scene.toml")) {
             Ok(scene) => Some(scene),
             Err(error) => {
@@ -47,7 +55,7 @@ impl ShallowFolder {
                 None
             }
         };
-        Ok(Some(Self { folder: folder.to_path_buf(), liquid, scene, terrain: None, frames }))
+        Ok(Some(Self { folder: folder.to_path_buf(), liquid, scene, terrain: None, extension, frames }))
     }
 
     /// The terrain, and the objects on it; a warning if they cannot be read.
@@ -107,7 +115,7 @@ impl Folder for ShallowFolder {
             parts.retain(|part| !matches!(part, Part::Ground(..)));
             parts.push(Part::Ground(stained.mesh, stains, look));
         }
-        let path = self.liquid.file_with(frame, LIQUID, "ply")?;
+        let path = self.liquid.file_with(frame, LIQUID, self.extension)?;
         // A file without faces is not a mesh.
         let report = self.liquid.report(frame)?;
         let is_dry = report.is_some_and(|report| report["triangles"].as_u64() == Some(0));

@@ -30,10 +30,10 @@ type Files = BTreeMap<i32, PathBuf>;
 /// The stages that are drawn, in this order, each with its readable kinds of files, the best first.
 const STAGES: [(&str, &[&str]); 5] = [
     ("base", &["vdb"]),
-    ("grains", &["vdb", "ply"]),
+    ("grains", &["vdb", "ply", "usdc"]),
     ("mist", &["vdb"]),
-    ("objects", &["ply"]),
-    ("surface", &["ply"]),
+    ("objects", &["ply", "usdc"]),
+    ("surface", &["ply", "usdc"]),
 ];
 
 impl ShotFolder {
@@ -101,8 +101,9 @@ impl Folder for ShotFolder {
                 let points = self.grains.points(ctx, frame)?.clone();
                 parts.push(Part::Points(path, points));
             }
-            Some(_) => {
-                parts.push(points_of(&self.grains.stored().file_with(frame, STAGES[1].0, "ply")?)?);
+            Some(path) => {
+                let path = self.grains.stored().file_with(frame, STAGES[1].0, &extension(&path))?;
+                parts.push(points_of(&path)?);
             }
             None => {}
         }
@@ -112,9 +113,9 @@ impl Folder for ShotFolder {
         for (stored, (stage, _), file) in
             [(&self.objects, STAGES[3], objects), (&self.surface, STAGES[4], surface)]
         {
-            if file.is_some() {
-                let path = stored.file_with(frame, stage, "ply")?;
-                parts.push(Part::Mesh(mesh::read_detailed(&path)?.without_unused()));
+            if let Some(file) = file {
+                let path = stored.file_with(frame, stage, &extension(&file))?;
+                parts.push(Part::Mesh(mesh::read_any(&path)?.into_detailed().without_unused()));
             }
         }
         Ok(parts)

@@ -169,8 +169,7 @@ fn read_file(path: &Path, clip: Option<&str>, frame: Option<f64>, fps: f64) -> R
         "vdb" => return parts_of_vdb(path),
         #[cfg(not(feature = "vdb"))]
         "vdb" => return crate::cli::needs_openvdb(path),
-        "ply" if io::particles::ply::holds_points(path)? => return Ok(vec![points_of(path)?]),
-        _ if crate::cli::points::is_point_file(path) => return Ok(vec![points_of(path)?]),
+        _ if io::particles::holds_points(path)? => return Ok(vec![points_of(path)?]),
         _ if is_gltf(path) && clip.is_none() && frame.is_none() => without_data(Character::at_rest(path)?),
         _ if is_gltf(path) => {
             let play = Play { clip: clip.map(String::from), ..Play::default() };

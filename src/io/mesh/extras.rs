@@ -14,8 +14,21 @@ pub fn of(path: &Path) -> Result<Vec<&'static str>> {
     Ok(match extension(path).as_str() {
         "obj" => obj(&source::read(path)?),
         "ply" => ply(&source::read(path)?),
+        "usdc" | "usd" => usd(path)?,
         _ => Vec::new(),
     })
+}
+
+/// USD's normals are computed anew, so that they are no loss.
+fn usd(path: &Path) -> Result<Vec<&'static str>> {
+    let mesh = super::read_any(path)?;
+    let has = |names: &[&str]| mesh.arrays.iter().any(|array| names.contains(&&*array.name));
+    let found = [
+        ("UVs", mesh.uvs.is_some()),
+        ("colours", has(&["red", "green", "blue", "alpha"])),
+        ("velocities", has(&["vx", "vy", "vz"])),
+    ];
+    Ok(found.into_iter().filter(|(_, found)| *found).map(|(name, _)| name).collect())
 }
 
 fn obj(bytes: &[u8]) -> Vec<&'static str> {

@@ -1,14 +1,15 @@
-//! Meshes in files, by extension: Wavefront .obj, Stanford .ply, .stl.
+//! Meshes in files, by extension: Wavefront .obj, Stanford .ply, .stl, binary USD (.usdc, .usd).
 
 #[doc(hidden)]
 pub mod extras;
 mod obj;
 pub(in crate::io) mod ply;
 mod ply_header;
-mod ply_write;
+pub(in crate::io) mod ply_write;
 mod stl;
 mod stl_solids;
 mod stl_text;
+mod usd;
 
 use std::path::Path;
 
@@ -19,8 +20,8 @@ use crate::geometry::{DVec3, DetailedMesh, PolygonMesh, TriMesh};
 
 pub use ply_write::Carried;
 
-/// Formats that can be read and written, by extension.
-pub const EXTENSIONS: [&str; 3] = ["obj", "ply", "stl"];
+/// Formats that can be read, by extension. [`write()`] writes the first three, and [`crate::io::usd`] the others.
+pub const EXTENSIONS: [&str; 5] = ["obj", "ply", "stl", "usdc", "usd"];
 
 /// Reads a mesh as triangles: all its vertices, in the file's order.
 ///
@@ -66,7 +67,7 @@ pub fn parse_polygons_from(path: &Path, bytes: &[u8], origin: DVec3) -> Result<P
 }
 
 /// As [`read_polygons`], for a file that may hold an empty mesh, such as a frame of a liquid before it appears or after it is gone. The
-/// file must declare this, as a .ply with 0 faces and an .obj by frazil do, or be an .stl.
+/// file must declare this, as a .ply with 0 faces, a mesh in USD and an .obj by frazil do, or be an .stl.
 ///
 /// # Errors
 /// As [`read`], except for a mesh that has neither vertices nor faces.
@@ -96,6 +97,7 @@ fn parse(path: &Path, bytes: &[u8], origin: DVec3) -> Result<PolygonMesh> {
         "obj" => obj::parse(bytes, origin).map(|mesh| (mesh, None)),
         "ply" => ply::parse(bytes, origin).map(|mesh| (mesh, None)),
         "stl" => stl::parse(bytes, origin),
+        "usdc" | "usd" => usd::parse(bytes, origin),
         other => Err(format!(
             "a mesh file must be {}, not \".{other}\"",
             EXTENSIONS.map(|e| format!(".{e}")).join(", ")

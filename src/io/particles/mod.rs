@@ -1,4 +1,4 @@
-//! Particle caches in files, by extension: classic .bgeo (version 5, plain or in gzip), legacy .vtk, .vtu, .xyz and .ply.
+//! Particle caches in files, by extension: classic .bgeo (version 5, plain or in gzip), legacy .vtk, .vtu, .xyz, .ply and binary USD.
 //! Points in .vdb files are read by `vdb::points`.
 //!
 //! | file | what is read |
@@ -8,6 +8,7 @@
 //! | .vtu | UnstructuredGrid, all pieces: text, base64, appended raw and base64; plain, zlib and LZ4 |
 //! | .xyz | text with x, y and z in the first three columns, or little-endian 32-bit floats |
 //! | .ply | vertices: see [`ply`] |
+//! | .usdc, .usd | binary USD with one prim of points: v, id, pscale and primvars |
 //!
 //! Attributes keep the names of the file. Floats become 32-bit, positions stay 64-bit. Signed integers of up to 32 bits become 32-bit,
 //! longer ones 64-bit. As in .ply, `id` becomes 64-bit integers, `active` and `trapped` become `bool`, and a value that all points share is
@@ -16,6 +17,7 @@
 
 mod bgeo;
 pub mod ply;
+mod usd;
 mod vtk;
 mod vtu;
 mod vtu_data;
@@ -33,7 +35,7 @@ use crate::geometry::mesh::spacing;
 use crate::geometry::points::{Attribute, Column, Points, Values};
 
 /// Extensions of the files that can be read.
-pub const READ: [&str; 7] = ["bgeo", "bgeo.gz", "bhclassic", "ply", "vtk", "vtu", "xyz"];
+pub const READ: [&str; 9] = ["bgeo", "bgeo.gz", "bhclassic", "ply", "usdc", "usd", "vtk", "vtu", "xyz"];
 /// Extensions of the files that can be written.
 pub const WRITTEN: [&str; 5] = ["bgeo", "bgeo.gz", "bhclassic", "ply", "xyz"];
 
@@ -91,6 +93,7 @@ enum Format {
     /// Houdini's own format, compressed.
     BgeoSc,
     Ply,
+    Usd,
     Vtk,
     Vtu,
     Xyz,
@@ -104,6 +107,8 @@ fn format(path: &Path) -> Option<Format> {
         (".bhclassic", Format::Bgeo),
         (".bgeo.sc", Format::BgeoSc),
         (".ply", Format::Ply),
+        (".usdc", Format::Usd),
+        (".usd", Format::Usd),
         (".vtk", Format::Vtk),
         (".vtu", Format::Vtu),
         (".xyz", Format::Xyz),
@@ -114,6 +119,23 @@ fn format(path: &Path) -> Option<Format> {
 /// Whether a file's name is that of a particle file: those of [`READ`], and .bgeo.sc, which [`read`] refuses with advice.
 pub fn has_extension_of_particles(path: &Path) -> bool {
     format(path).is_some()
+}
+
+/// Whether a file of this name holds points or a mesh, whichever it says: .ply and USD.
+pub fn may_hold_mesh(path: &Path) -> bool {
+    matches!(format(path), Some(Format::Ply | Format::Usd))
+}
+
+/// Whether a file holds points and no mesh, as its contents say where [`may_hold_mesh`], and its name otherwise.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn holds_points(path: &Path) -> Result<bool> {
+    Ok(match format(path) {
+        Some(Format::Ply) => ply::holds_points(&source::read(path)?),
+        Some(Format::Usd) => usd::holds_points(&source::read(path)?),
+        other => other.is_some(),
+    })
 }
 
 /// Advice about a file of this name that no reader accepts; none for other names.
@@ -146,6 +168,7 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<ParticleData> {
         Some(Format::Bgeo) => found(bgeo::parse),
         Some(Format::BgeoSc) => Err(bgeo::HOUDINI_JSON.into()),
         Some(Format::Ply) => ply::parse(bytes).map(|cloud| (cloud, Vec::new())),
+        Some(Format::Usd) => found(usd::parse),
         Some(Format::Vtk) => found(vtk::parse),
         Some(Format::Vtu) => found(vtu::parse),
         Some(Format::Xyz) => found(xyz::parse),

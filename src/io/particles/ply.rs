@@ -25,16 +25,12 @@ const MAX_ROUNDING: f64 = 1e-3;
 
 /// Whether a .ply file has vertices and no faces. A file that has neither holds a mesh if it declares zero faces, and points if it does not
 /// declare faces.
-///
-/// # Errors
-/// A file that cannot be read.
-pub fn holds_points(path: &Path) -> Result<bool> {
-    let bytes = source::read(path)?;
+pub(super) fn holds_points(bytes: &[u8]) -> bool {
     let is_face = |element: &Element| element.name == "face" || element.name == "tristrips";
-    Ok(ply::open(&bytes).is_ok_and(|body| {
+    ply::open(bytes).is_ok_and(|body| {
         let has_vertices = body.elements.iter().any(|e| e.name == "vertex" && e.count > 0);
         !body.elements.iter().any(|e| is_face(e) && (e.count > 0 || !has_vertices))
-    }))
+    })
 }
 
 /// Reads the vertices of a .ply file as points. `id` becomes 64-bit integers, `active` and `trapped` become `bool`; other integers of up to

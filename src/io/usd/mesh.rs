@@ -8,7 +8,7 @@ use super::materials::Look;
 use super::primvars::{self, Faces, Primvar};
 use crate::geometry::mesh::normals;
 use crate::geometry::{MeshArray, TriMesh, Uvs, Vec3};
-use crate::io::mesh::Carried;
+use crate::io::mesh::ply_write::Carried;
 
 /// A moving mesh at one frame.
 pub struct MeshFrame<'a> {

@@ -1,12 +1,13 @@
 //! USD: the output of a shot for any program that reads it, as text (.usda) or as a binary crate (.usdc, .usd).
 
-mod binary;
+pub(in crate::io) mod binary;
 mod file;
-mod layer;
+pub(in crate::io) mod layer;
 pub mod materials;
 mod mesh;
 pub mod points;
 pub mod primvars;
+pub(in crate::io) mod read;
 mod stage;
 mod text;
 mod volumes;

@@ -23,7 +23,8 @@ const OBJECT_SCOPES: Scopes = &[("base", Object), ("grains", Object), ("mist", O
 pub const OPTIONAL_TABLES: &[&str] = &["grains", "mist"];
 
 /// Extensions of objects: characters and meshes.
-const OBJECT_EXTENSIONS: &[&str] = &["glb", "gltf", EXTENSIONS[0], EXTENSIONS[1], EXTENSIONS[2]];
+const OBJECT_EXTENSIONS: &[&str] =
+    &["glb", "gltf", EXTENSIONS[0], EXTENSIONS[1], EXTENSIONS[2], EXTENSIONS[3], EXTENSIONS[4]];
 
 /// Scopes of `shot.frames`: the first frame determines the first state.
 const FRAMES_SCOPES: Scopes = &[

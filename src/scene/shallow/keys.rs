@@ -8,7 +8,8 @@ use crate::scene::schema::declaration::{Key, Kind, OBJECT, Scope, Scopes, key, o
 use crate::scene::schema::{FAR, NO_ORIGIN, ORIGIN, ORIGIN_MEANS};
 
 /// Extensions of a terrain: a mesh, a level set or an image of heights.
-const TERRAINS: &[&str] = &[EXTENSIONS[0], EXTENSIONS[1], EXTENSIONS[2], "vdb", "png"];
+const TERRAINS: &[&str] =
+    &[EXTENSIONS[0], EXTENSIONS[1], EXTENSIONS[2], EXTENSIONS[3], EXTENSIONS[4], "vdb", "png"];
 /// Maximum of a volume, and of a rate (ml, ml/s): a cubic kilometre.
 const MAX_ML: f64 = 1.0e15;
 /// Frame numbers allowed in a scene.

@@ -12,7 +12,7 @@ use crate::geometry::points::Values;
 use crate::geometry::spatial::bvh::Bvh;
 use crate::geometry::{DVec3, TriMesh};
 use crate::io::mesh::extension;
-use crate::io::particles::ply;
+use crate::io::particles;
 use crate::io::records::input_hashes::InputHashes;
 use crate::scene::Scene;
 use crate::scene::schema::rounded;
@@ -52,8 +52,8 @@ impl InitialGrains {
     ) -> Result<Option<Self>> {
         let Some(path) = file(scene) else { return Ok(None) };
         input_hashes.hash(path)?;
-        let (positions, attributes) = if extension(path) == "ply" {
-            let data = ply::read(path)?;
+        let (positions, attributes) = if extension(path) != "vdb" {
+            let data = particles::read(path)?;
             (data.positions, data.attributes)
         } else {
             if let Some(since) = changes_since(path)? {

@@ -6,7 +6,7 @@ use crate::scene::schema::declaration::{Key, Scope, Scopes, key, optional, or, r
 use crate::scene::schema::{NO_ORIGIN, ORIGIN, ORIGIN_MEANS};
 
 /// Extensions of particle files, of which "gz" is that of .bgeo.gz.
-const PARTICLES: &[&str] = &["bgeo", "bhclassic", "gz", "ply", "vdb", "vtk", "vtu", "xyz"];
+const PARTICLES: &[&str] = &["bgeo", "bhclassic", "gz", "ply", "usdc", "usd", "vdb", "vtk", "vtu", "xyz"];
 
 const FIRST: Scopes = &[("surface", Scope::First)];
 const STEP: Scopes = &[("surface", Scope::Step)];

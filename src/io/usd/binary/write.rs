@@ -1,20 +1,11 @@
-//! A layer as a binary crate (.usdc), USD's own format: a third of the text's size or less, and read without parsing.
-//!
-//! A crate is a heap of values and six sections. *Tokens* are all words, each once. *Strings* are those that are text. A *field* is a name
-//! with a value, a *field set* the fields of a prim or attribute, a *path* its position in the tree, and a *spec* puts a path and a field
-//! set together. Values are 64-bit numbers that hold the type and either the value itself or its offset in the file. Integers are packed as
-//! differences in 8, 16 or 32 bits, and then by LZ4.
-//!
-//! The format is that of OpenUSD's `pxr/usd/sdf/crateFile.h`, version 0.8, and not a newer one, so that programs with an older USD read
-//! it. (The crate `openusd` 0.6 writes children as arrays and packs arrays of 4 to 15 integers, both of which USD refuses.)
-
-mod packing;
+//! Writes a layer as a crate.
 
 use std::collections::HashMap;
 
-use super::layer::{Attribute, Layer, Prim, Property, Specifier, Value};
+use super::packing::{Integer, ToBytes, put_compressed, put_packed};
+use super::{ARRAY, END, HEADER, IDENTIFICATION, INLINE, PACKED, SpecType, Type};
 use crate::error::{Error, Result};
-use packing::{Integer, ToBytes, put_compressed, put_packed};
+use crate::io::usd::layer::{Attribute, Layer, Prim, Property, Specifier, Value};
 
 /// The bytes of a layer.
 ///
@@ -39,50 +30,12 @@ pub(in crate::io) fn bytes(layer: Layer) -> Result<Vec<u8>> {
     Ok(out.finish(&root))
 }
 
-/// Bytes of the header: identification, version, position of the table of contents, and room for more.
-const HEADER: usize = 88;
-const IDENTIFICATION: &[u8; 8] = b"PXR-USDC";
+/// The version that is written.
 const VERSION: [u8; 8] = [0, 8, 0, 0, 0, 0, 0, 0];
 /// Arrays with fewer numbers are not packed.
 const MIN_PACKED: usize = 16;
 /// Tables of floats are no longer.
 const MAX_TABLE: usize = 1023;
-
-/// Kinds of specs, as USD numbers them.
-#[derive(Clone, Copy)]
-enum SpecType {
-    Attribute = 1,
-    Prim = 6,
-    PseudoRoot = 7,
-}
-
-/// Types of values, as USD numbers them.
-#[derive(Clone, Copy)]
-enum Type {
-    Bool = 1,
-    Int = 3,
-    Uint = 4,
-    Int64 = 5,
-    Float = 8,
-    Double = 9,
-    Text = 10,
-    Token = 11,
-    Asset = 12,
-    Double2 = 19,
-    Float2 = 20,
-    Double3 = 23,
-    Float3 = 24,
-    Int3 = 26,
-    TokenVector = 41,
-    Specifier = 42,
-    Variability = 44,
-    TimeSamples = 46,
-}
-
-/// Flags of a value: an array, the value itself instead of its offset, packed.
-const ARRAY: u64 = 1 << 63;
-const INLINE: u64 = 1 << 62;
-const PACKED: u64 = 1 << 61;
 
 /// A prim or attribute in the tree of paths.
 struct Node {
@@ -110,9 +63,6 @@ struct Writer {
     /// First field and type of each spec; its path has the same index.
     specs: Vec<(u32, SpecType)>,
 }
-
-/// Ends a field set.
-const END: u32 = u32::MAX;
 
 impl Writer {
     fn token(&mut self, text: &str) -> u32 {

@@ -52,7 +52,7 @@ pub const GRAIN_KEYS: &[Key] = &[
         .means("age at which a grain is removed (s)"),
     key(STEP, "grains", "keep_box", Numbers(6, FAR, "m"), optional("[-3.0, -1.0, -3.0, 3.0, 3.0, 3.0]"))
         .means("grains outside this box are removed: x0, y0, z0, x1, y1, z1 (m)"),
-    key(FIRST, "grains", "initial", File(&["ply", "vdb"]), optional("\"drift.ply\""))
+    key(FIRST, "grains", "initial", File(&["ply", "vdb", "usdc", "usd"]), optional("\"drift.ply\""))
         .means("points that become grains at the first frame, with their velocities v, if any"),
     key(STEP, "grains", "seed", Whole(0, i32::MAX as i64), or("0"))
         .means("another seed scatters new grains differently"),

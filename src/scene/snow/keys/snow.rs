@@ -16,7 +16,8 @@ const GROUND: Scopes = &[("base", Scope::First), ("grains", Scope::First), ("mis
 /// Range of the edge of a voxel (m).
 const CELL_RANGE: (f64, f64) = (1.0e-5, 10.0);
 /// Extensions of `top`: a mesh of the top surface, or a level set of the whole layer.
-const TOP_EXTENSIONS: &[&str] = &["vdb", EXTENSIONS[0], EXTENSIONS[1], EXTENSIONS[2]];
+const TOP_EXTENSIONS: &[&str] =
+    &["vdb", EXTENSIONS[0], EXTENSIONS[1], EXTENSIONS[2], EXTENSIONS[3], EXTENSIONS[4]];
 
 const FIRST: Scopes = &[("base", Scope::First)];
 const STEP: Scopes = &[("base", Scope::Step)];
