@@ -78,8 +78,8 @@ impl Stage for Objects<'_> {
         &[FileKind { name: "objects", extensions: &["usdc", "usda", "ply"] }]
     }
 
-    fn usd_kind(&self) -> Option<&'static str> {
-        self.scene.output.objects_usd.then_some("objects")
+    fn usd_kinds(&self) -> Vec<&'static str> {
+        self.scene.output.objects_usd.then_some("objects").into_iter().collect()
     }
 
     fn settings(&self) -> Result<Settings> {
@@ -98,7 +98,7 @@ impl Stage for Objects<'_> {
         Keeps::Whole
     }
 
-    fn clip(&self) -> Option<Clips<'_>> {
+    fn clips(&self) -> Vec<Clips<'_>> {
         let uvs = self.bodies.iter().map(|body| body.motion().drawn().uvs);
         let named = self.names.iter().cloned().zip(uvs);
         let mesh = |(name, uvs)| MeshPrim {
@@ -109,7 +109,7 @@ impl Stage for Objects<'_> {
             primvars: Vec::new(),
             shading: Shading::Creased,
         };
-        Some(Clips::new("objects", ClipPrims::Meshes(named.map(mesh).collect())))
+        vec![Clips::new("objects", ClipPrims::Meshes(named.map(mesh).collect()))]
     }
 }
 

@@ -32,10 +32,12 @@ pub fn write_mesh(path: &Path, mesh: &DetailedMesh) {
     mesh::write_carried(path, &mesh.mesh, &carried).expect("a file");
 }
 
-/// A frame's mesh as it was written.
+/// A frame's mesh as it was written: in .ply, if the shot has it, whose arrays have the types of the first mesh's.
 #[track_caller]
 pub fn frame(folder: &Path, out: &str, frame: i32) -> DetailedMesh {
-    mesh::read_detailed(&folder.join(format!("{out}/surface/surface.{frame:04}.ply"))).expect("a mesh")
+    let file = |kind: &str| folder.join(format!("{out}/surface/surface.{frame:04}.{kind}"));
+    let [ply, usd] = ["ply", "usdc"].map(file);
+    mesh::read_detailed(if ply.is_file() { &ply } else { &usd }).expect("a mesh")
 }
 
 /// The values of one of its arrays.

@@ -80,6 +80,7 @@ mod scene {
     mod shallow_carried;
     mod shallow_follows;
     mod shallow_shot;
+    mod shallow_usd;
     mod shallow_volume;
     mod shot_folder;
     mod shot_grain_files;

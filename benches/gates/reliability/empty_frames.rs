@@ -126,7 +126,7 @@ fn followed(folder: &Path, pattern: &[Frame; FRAMES], count: &mut Count) {
         for (number, frame) in (1..=end).zip(pattern) {
             count.all += 1;
             count.lost +=
-                usize::from(!holds(&folder.join(format!("s/surface/surface.{number:04}.ply")), *frame));
+                usize::from(!holds(&folder.join(format!("s/surface/surface.{number:04}.usdc")), *frame));
         }
     };
     if can_begin {

@@ -216,7 +216,7 @@ impl Case<'_> {
         let said =
             self.frazil(&format!("surface -p drops.%04d.ply -m {file} --spacing {spacing} -o shot -q {set}"));
         let found =
-            mesh::read(&self.folder.join("shot/surface/surface.0001.ply")).ok().map(|mesh| mesh.volume());
+            mesh::read(&self.folder.join("shot/surface/surface.0001.usdc")).ok().map(|mesh| mesh.volume());
         (said, found)
     }
 

@@ -80,6 +80,8 @@ impl Spot {
     fn pass(&self, out: &str, threads: usize) -> Command {
         let threads = threads.to_string();
         let mut run = frazil(["surface", "-q", "--set", "surface.rebuild=false", "--threads", &threads]);
+        // Whole: USD leaves out triangles without an area.
+        run.args(["--set", "output.surface=[\"ply\"]"]);
         run.args(["--fps", &FPS.to_string(), "--spacing", &SPACING.to_string()]);
         run.arg("-p").arg(&self.cache).arg("-m").arg(self.folder.join("spot.ply"));
         run.arg("-o").arg(self.folder.join(out));

@@ -26,7 +26,7 @@ use crate::cli::session::{Failure, OrFailure, Session};
 Examples:
   frazil mesh compare before.obj after.obj
   frazil mesh compare body.%04d.obj boot.obj --frames 1-2 --json
-  frazil mesh compare out/surface/surface.%04d.ply --frames 1-3 --flicker")]
+  frazil mesh compare out/surface/surface.%04d.usdc --frames 1-3 --flicker")]
 pub struct Args {
     /// Mesh (.obj, .ply, .stl), character at rest (.glb, .gltf), or a sequence of meshes (a.%04d.ply).
     a: PathBuf,

@@ -108,9 +108,15 @@ impl Folder for ShallowFolder {
         let look = self.scene.as_ref().and_then(|scene| scene.shallow().ok());
         let look = LiquidLook::of(look.map_or("", |liquid| &*liquid.look));
         let mut parts = self.around(ctx, frame, look);
-        let is_stained = |(at, path): &(i32, String)| *at == frame && path.ends_with(".ply");
-        if self.liquid.files(TERRAIN).iter().any(is_stained) {
-            let stained = mesh::read_detailed(&self.liquid.file_with(frame, TERRAIN, "ply")?)?;
+        let of_terrain: Vec<String> = self
+            .liquid
+            .files(TERRAIN)
+            .into_iter()
+            .filter(|(at, _)| *at == frame)
+            .map(|(_, path)| extension(path.as_ref()))
+            .collect();
+        if let Some(kind) = DRAWN.into_iter().find(|kind| of_terrain.iter().any(|other| other == kind)) {
+            let stained = mesh::read_detailed(&self.liquid.file_with(frame, TERRAIN, kind)?)?;
             let stains = stained.of_vertices("stain").unwrap_or_default();
             parts.retain(|part| !matches!(part, Part::Ground(..)));
             parts.push(Part::Ground(stained.mesh, stains, look));

@@ -11,7 +11,7 @@ use crate::cli::session::{Failure, OrFailure, Session};
 
 /// Let a little liquid flow over a terrain: blood, water, paint, honey.
 ///
-/// Writes liquid/liquid.%04d.ply (the surface and the liquid in the air, with velocities, depths, layers, opacities and scalars),
+/// Writes liquid/liquid.%04d.usdc (the surface and the liquid in the air, with velocities, depths, layers, opacities and scalars),
 /// volume/volume.%04d.vdb if the scene asks for it, report/liquid.%04d.json (ml inside, added and removed, steps, times), shot.usda and
 /// scene.toml, the scene with every default filled in. Frames that exist and match are not made again; a folder with frames of other
 /// settings is refused.

@@ -11,7 +11,7 @@ use crate::cli::session::{Failure, OrFailure, Session};
 
 /// Carry a detailed mesh along with the particles of a liquid, frame by frame, keeping its detail.
 ///
-/// Writes surface/surface.%04d.ply (with velocities over the coming frame, the distance that each vertex keeps, and flags where
+/// Writes surface/surface.%04d.usdc (with velocities over the coming frame, the distance that each vertex keeps, and flags where
 /// the liquid merged or split), report/surface.%04d.json, shot.usda and scene.toml, the scene with every default
 /// filled in. Frames that exist and match are not made again; a folder with frames of other settings is refused.
 #[derive(clap::Args)]

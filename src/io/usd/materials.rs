@@ -12,6 +12,8 @@ pub enum Look {
     Fog,
     /// Objects that move through the snow. A `UsdPreviewSurface`.
     Object,
+    /// What a liquid flows over, in the colours of `displayColor` where stains leave them. A `UsdPreviewSurface`.
+    Terrain,
     /// Liquids with a surface, with the opacity of `displayOpacity`. Each is a `UsdPreviewSurface`.
     Water,
     /// See [`Look::Water`].
@@ -34,6 +36,7 @@ impl Look {
             Self::Snow => "snow",
             Self::Fog => "fog",
             Self::Object => "object",
+            Self::Terrain => "terrain",
             Self::Water => "water",
             Self::Blood => "blood",
             Self::Paint => "paint",
@@ -58,17 +61,14 @@ impl Look {
         let name = self.name();
         let path = format!("/shot/{SCOPE}/{name}");
         let mut material = Prim::def("Material", name);
-        // Fresh snow reflects nine tenths of the light, blue a little more than red; its grains scatter forward.
-        let (colour, roughness) = match self {
-            Self::Snow => ([0.9, 0.92, 0.95], 0.75),
-            Self::Object => ([0.32, 0.33, 0.36], 0.5),
-            Self::Water => ([0.05, 0.25, 0.3], WET),
-            Self::Blood => ([0.3, 0.008, 0.006], WET),
-            Self::Paint => ([0.05, 0.2, 0.6], 0.3),
-            Self::Honey => ([0.75, 0.36, 0.03], WET),
+        let roughness = match self {
+            Self::Snow => 0.75,
+            Self::Object => 0.5,
+            Self::Terrain => 0.8,
+            Self::Paint => 0.3,
+            Self::Water | Self::Blood | Self::Honey => WET,
             Self::Fog => {
-                let albedo = Value::Vector([0.98, 0.985, 0.99]);
-                material.add(Attribute::new("color3f", "inputs:albedo").with(albedo));
+                material.add(Attribute::new("color3f", "inputs:albedo").with(Value::Vector(self.colour())));
                 material.add(Attribute::new("float", "inputs:anisotropy").with(Value::Float(0.3)));
                 return material;
             }
@@ -77,7 +77,12 @@ impl Look {
             Attribute::new("token", "outputs:surface").connected(format!("{path}/surface.outputs:surface")),
         );
         let mut surface = shader("surface", "UsdPreviewSurface");
-        surface.add(Attribute::new("color3f", "inputs:diffuseColor").with(Value::Vector(colour)));
+        let colour = Attribute::new("color3f", "inputs:diffuseColor").with(Value::Vector(self.colour()));
+        surface.add(if self == Self::Terrain {
+            Attribute { value: None, ..colour.connected(format!("{path}/colour.outputs:result")) }
+        } else {
+            colour
+        });
         surface.add(Attribute::new("float", "inputs:roughness").with(Value::Float(roughness)));
         if self.is_liquid() {
             let opacity = format!("{path}/opacity.outputs:result");
@@ -86,13 +91,27 @@ impl Look {
         surface.add(Attribute::new("token", "outputs:surface"));
         material.children.push(surface);
         if self.is_liquid() {
-            let mut reader = shader("opacity", "UsdPrimvarReader_float");
-            reader.add(Attribute::new("float", "inputs:fallback").with(Value::Float(1.0)));
-            reader.add(Attribute::new("string", "inputs:varname").with(Value::Text("displayOpacity".into())));
-            reader.add(Attribute::new("float", "outputs:result"));
-            material.children.push(reader);
+            material.children.push(reader("opacity", "float", Value::Float(1.0), "displayOpacity"));
+        }
+        if self == Self::Terrain {
+            material.children.push(reader("colour", "float3", Value::Vector(self.colour()), "displayColor"));
         }
         material
+    }
+
+    /// Its colour: the diffuse reflection, linear, or the albedo of a fog.
+    pub fn colour(self) -> [f32; 3] {
+        // Fresh snow reflects nine tenths of the light, blue a little more than red; its grains scatter forward.
+        match self {
+            Self::Snow => [0.9, 0.92, 0.95],
+            Self::Object => [0.32, 0.33, 0.36],
+            Self::Terrain => [0.5, 0.47, 0.43],
+            Self::Water => [0.05, 0.25, 0.3],
+            Self::Blood => [0.3, 0.008, 0.006],
+            Self::Paint => [0.05, 0.2, 0.6],
+            Self::Honey => [0.75, 0.36, 0.03],
+            Self::Fog => [0.98, 0.985, 0.99],
+        }
     }
 }
 
@@ -100,6 +119,15 @@ impl Look {
 fn shader(name: &str, id: &str) -> Prim {
     let mut prim = Prim::def("Shader", name);
     prim.add(Attribute::token("info:id", id));
+    prim
+}
+
+/// A shader that passes on the values of a primvar, or a number where a mesh lacks it.
+fn reader(name: &str, class: &'static str, fallback: Value, primvar: &str) -> Prim {
+    let mut prim = shader(name, &format!("UsdPrimvarReader_{class}"));
+    prim.add(Attribute::new(class, "inputs:fallback").with(fallback));
+    prim.add(Attribute::new("string", "inputs:varname").with(Value::Text(primvar.into())));
+    prim.add(Attribute::new(class, "outputs:result"));
     prim
 }
 

@@ -14,7 +14,10 @@ mod volumes;
 
 pub use file::{BINARY, Contents, ContentsByName, File, Format, Units};
 pub use mesh::{MeshFrame, MeshPrim, Shading, clip};
-pub use stage::{ClipPrims, Clips, SAMPLES, StageTime, clip_manifest, manifest_path, samples, stage};
+pub use stage::{
+    ClipPrims, Clips, SAMPLES, StageTime, StillMeshes, clip_manifest, manifest_path, samples, stage,
+    still_path,
+};
 pub use text::prim_name;
 pub use volumes::{Field, Holds, VolumeFile, VolumeFiles};
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::file::{Format, Units};
+use super::file::{BINARY, Format, Units};
 use super::layer::{Attribute, Layer, Prim, Value};
 use super::materials::{self, Look};
 use super::mesh::MeshPrim;
@@ -38,6 +38,36 @@ pub enum ClipPrims<'a> {
     Meshes(Vec<MeshPrim<'a>>),
     /// A `Points` prim with the kind's name, as [`points::frame`] writes it; the points here only tell which attributes it declares.
     Points(Points),
+}
+
+/// Meshes that never change, in a file of their own beside the stage.
+pub struct StillMeshes {
+    /// The prim that holds them, and the name of the file: see [`still_path`].
+    pub kind: &'static str,
+    /// The bytes of the file.
+    pub bytes: Vec<u8>,
+    /// The meshes by name, with their materials.
+    pub looks: Vec<(String, Look)>,
+}
+
+impl StillMeshes {
+    /// Its prim in the shot.
+    fn prim(&self) -> Prim {
+        let mut prim = Prim::def("Xform", self.kind);
+        prim.metadata.push(("prepend references", Value::Asset(format!("./{}", still_path(self.kind)))));
+        for (name, look) in &self.looks {
+            let mut mesh = Prim::over(name.as_str());
+            mesh.schemas.push(Look::SCHEMA);
+            look.bind(&mut mesh);
+            prim.children.push(mesh);
+        }
+        prim
+    }
+}
+
+/// Path of the file of meshes that never change, relative to the stage.
+pub fn still_path(kind: &str) -> String {
+    format!("{kind}.{BINARY}")
 }
 
 impl<'a> Clips<'a> {
@@ -123,16 +153,24 @@ pub fn samples(volumes: &[VolumeFiles]) -> Result<Vec<u8>> {
 /// The prim of a shot.
 const SHOT: &str = "shot";
 
-/// A stage with the shot's volumes, whose samples are in a layer of its own if there are any, and clips.
+/// A stage with the shot's volumes, whose samples are in a layer of its own if there are any, clips, and meshes that never change.
 ///
 /// # Errors
 /// A layer that cannot be written.
-pub fn stage(comment: &str, time: StageTime, volumes: &[VolumeFiles], clips: &[Clips]) -> Result<Vec<u8>> {
+pub fn stage(
+    comment: &str,
+    time: StageTime,
+    volumes: &[VolumeFiles],
+    clips: &[Clips],
+    still: &[StillMeshes],
+) -> Result<Vec<u8>> {
     let mut root = Prim::def("Xform", SHOT);
     let of_volumes = volumes.iter().filter_map(|volume| volume.look());
-    let materials = materials::scope(of_volumes.chain(clips.iter().flat_map(Clips::looks)).collect());
-    let of_volumes = volumes.iter().map(VolumeFiles::prim);
-    root.children = materials.into_iter().chain(of_volumes).chain(clips.iter().map(Clips::prim)).collect();
+    let of_still = still.iter().flat_map(|still| still.looks.iter().map(|(_, look)| *look));
+    let of_clips = clips.iter().flat_map(Clips::looks);
+    let materials = materials::scope(of_volumes.chain(of_clips).chain(of_still).collect());
+    let prims = volumes.iter().map(VolumeFiles::prim).chain(still.iter().map(StillMeshes::prim));
+    root.children = materials.into_iter().chain(prims).chain(clips.iter().map(Clips::prim)).collect();
     let StageTime { first, last, fps } = time;
     let mut metadata = vec![("comment", Value::Text(comment.into()))];
     if !volumes.is_empty() {

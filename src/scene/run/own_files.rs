@@ -112,8 +112,9 @@ impl OwnFiles {
         if scene.output.usd {
             self.refuse_changed(SHOT_USD, None)?;
             self.refuse_changed(usd::SAMPLES, None)?;
-            let kinds = pipeline.stages().filter_map(|stage| stage.usd_kind());
-            kinds.map(usd::manifest_path).try_for_each(|name| self.refuse_changed(&name, None))?;
+            let kinds = pipeline.stages().flat_map(|stage| stage.usd_kinds());
+            let of_kind = |kind| [usd::manifest_path(kind), usd::still_path(kind)];
+            kinds.flat_map(of_kind).try_for_each(|name| self.refuse_changed(&name, None))?;
         }
         self.refuse_changed(SCENE, Some(&new))?;
         let requested = frames.first()..=frames.last();

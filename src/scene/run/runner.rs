@@ -242,7 +242,7 @@ impl<'a> Run<'a> {
                 .stages()
                 .map(|stage| DoneFrames::read(&folder, stage.name()))
                 .collect::<Result<_>>()?;
-            usd::write(self.pipeline, self.pipeline.stages().zip(&stored), &mut self.own)?;
+            usd::write(ctx, self.pipeline, self.pipeline.stages().zip(&stored), &mut self.own)?;
         }
         self.own.finish()
     }

@@ -60,9 +60,9 @@ pub trait Stage: Sync {
         "vdb"
     }
 
-    /// The kind of its USD files, if this scene has them. They share a manifest, which belongs to no single frame.
-    fn usd_kind(&self) -> Option<&'static str> {
-        None
+    /// The kinds of its USD files that this scene has. Those of a kind share a manifest, which belongs to no single frame.
+    fn usd_kinds(&self) -> Vec<&'static str> {
+        Vec::new()
     }
 
     /// The settings that its frames depend on.
@@ -117,8 +117,16 @@ pub trait Stage: Sync {
     }
 
     /// Its moving meshes or points for `shot.usda`, without frames.
-    fn clip(&self) -> Option<Clips<'_>> {
-        None
+    fn clips(&self) -> Vec<Clips<'_>> {
+        Vec::new()
+    }
+
+    /// Its meshes that never change, for `shot.usda`.
+    ///
+    /// # Errors
+    /// Files that can no longer be read; cancel.
+    fn still_meshes(&self, _ctx: &Context) -> Result<Option<usd::StillMeshes>> {
+        Ok(None)
     }
 }
 

@@ -6,15 +6,17 @@ use super::done_frames::DoneFrames;
 use super::own_files::{OwnFiles, SHOT_USD};
 use super::pipeline::Pipeline;
 use super::stage::{CONTENTS, Stage, Volume};
+use crate::context::Context;
 use crate::error::Result;
 use crate::io::mesh::extension;
-use crate::io::usd::{self, Clips, Field, Holds, VolumeFile, VolumeFiles};
+use crate::io::usd::{self, Clips, Field, Holds, StillMeshes, VolumeFile, VolumeFiles};
 
 /// Writes the description of the existing frames, with relative paths.
 ///
 /// # Errors
 /// What the operating system reports.
 pub(super) fn write<'s>(
+    ctx: &Context,
     pipeline: &Pipeline,
     stages: impl Iterator<Item = (&'s dyn Stage, &'s DoneFrames)>,
     files: &mut OwnFiles,
@@ -25,6 +27,7 @@ pub(super) fn write<'s>(
         files.map(|(frame, path)| (frame, format!("./{path}"))).collect()
     };
     let (mut volumes, mut clips): (Vec<VolumeFiles>, Vec<Clips>) = (Vec::new(), Vec::new());
+    let mut still = Vec::new();
     for (stage, stored) in stages {
         for Volume { kind, prim: name, fields, is_guide } in stage.volumes() {
             let of_frame = |(frame, path)| volume_file(stored, (kind, fields), frame, path);
@@ -33,10 +36,12 @@ pub(super) fn write<'s>(
                 Some(VolumeFiles { name, fields, is_guide, files }).filter(|one| !one.files.is_empty()),
             );
         }
-        let Some(mut clip) = stage.clip() else { continue };
-        let is_usd = |file: &String| usd::Format::of(&extension(Path::new(file))).is_some();
-        clip.files.extend(relative(stored, clip.kind).into_iter().filter(|(_, file)| is_usd(file)));
-        clips.extend(Some(clip).filter(|clip| !clip.files.is_empty()));
+        for mut clip in stage.clips() {
+            let is_usd = |file: &String| usd::Format::of(&extension(Path::new(file))).is_some();
+            clip.files.extend(relative(stored, clip.kind).into_iter().filter(|(_, file)| is_usd(file)));
+            clips.extend(Some(clip).filter(|clip| !clip.files.is_empty()));
+        }
+        still.extend(stage.still_meshes(ctx)?);
     }
     for Clips { kind, prims, .. } in &clips {
         files.write(&usd::manifest_path(kind), &usd::clip_manifest(kind, prims)?)?;
@@ -44,9 +49,12 @@ pub(super) fn write<'s>(
     if !volumes.is_empty() {
         files.write(usd::SAMPLES, &usd::samples(&volumes)?)?;
     }
+    for StillMeshes { kind, bytes, .. } in &still {
+        files.write(&usd::still_path(kind), bytes)?;
+    }
     let time = usd::StageTime { first: frames.first, last: frames.last, fps };
     let comment = format!("made by frazil {}", env!("CARGO_PKG_VERSION"));
-    files.write(SHOT_USD, &usd::stage(&comment, time, &volumes, &clips)?)
+    files.write(SHOT_USD, &usd::stage(&comment, time, &volumes, &clips, &still)?)
 }
 
 /// A file of a volume, whose extent is in the frame's report. Reports of frazil 0.1 have none, and one that is damaged (`check` says so)

@@ -56,8 +56,11 @@ const STATE_OF_SCALAR: u64 = 8;
 const STATE_OF_DROP: u64 = 220;
 /// Bytes of the voxels of a column, of which there are about two.
 const VOXEL: u64 = 2 * 4;
-/// Bytes of a triangle of a stained terrain: its corners, and for half a vertex the position, the stain, and the stain in the exact state.
-const FILE_OF_STAINED: u64 = 13 + (12 + 4 + 12) / 2;
+/// Bytes of a triangle of a terrain in a .ply and a USD file: its corners (in USD also those of its normals), and for half a vertex the
+/// position, the normal in USD, the stain and the colour; and of the stain in the exact state.
+const TERRAIN_PLY: u64 = 13 + (12 + 16) / 2;
+const TERRAIN_USD: u64 = 2 * 3 * INDEX + (12 + 12 + 16) / 2;
+const STATE_OF_STAIN: u64 = 12 / 2;
 /// Bytes of a frame's report and record.
 const RECORDS: u64 = 3000;
 
@@ -76,7 +79,8 @@ pub(in crate::scene::shallow) fn frame_bytes(setup: &Shallow, columns: u64, tria
         + falling;
     let vertex = 12 + if_asked(output.velocities, 12) + arrays;
     // Two triangles for each vertex, each with a byte for its count of corners.
-    let ply = vertex + 2 * 13;
+    // A colour goes with the opacity.
+    let ply = vertex + if_asked(output.alpha, 3) + 2 * 13;
     // Position, velocity and normal.
     let numbers = 9 + u64::from(output.depth) + u64::from(output.alpha) + u64::from(output.layer);
     let usd = 4 * (numbers + carried + falling) + 2 * 3 * INDEX;
@@ -85,8 +89,11 @@ pub(in crate::scene::shallow) fn frame_bytes(setup: &Shallow, columns: u64, tria
     let drops = setup.params.falls.map_or(0, |falls| falls.max_packets);
     // A drop's mesh has two triangles for each vertex.
     let in_air = bound(drops).vertices as u64 * (if_asked(output.ply, ply) + if_asked(output.usd, usd));
-    let stained = if_asked(setup.staining.is_some(), FILE_OF_STAINED * triangles);
-    columns * each + in_air + stained + drops as u64 * STATE_OF_DROP + RECORDS
+    let has_terrain = setup.staining.is_some() || setup.sequence().is_some();
+    let terrain = if_asked(output.terrain_ply, TERRAIN_PLY) + if_asked(output.terrain_usd, TERRAIN_USD);
+    let stain = if_asked(setup.staining.is_some(), STATE_OF_STAIN);
+    let terrain = (if_asked(has_terrain, terrain) + stain) * triangles;
+    columns * each + in_air + terrain + drops as u64 * STATE_OF_DROP + RECORDS
 }
 
 #[cfg(test)]
@@ -101,7 +108,7 @@ mod tests {
     #[test]
     fn a_ply_file_is_as_large_as_estimated_but_for_its_header() {
         let text = "[shot]\nframes = \"1-2\"\n[shallow]\nterrain = \"a.obj\"\ncell = 0.01\nfalls = true\nfalls_most = 1\n\
-                    [[scalar]]\nname = \"dye\"\n";
+                    [output]\nliquid = [\"ply\"]\n[[scalar]]\nname = \"dye\"\n";
         let scene = Scene::parse(text, Path::new("/s/shot.toml"), &[]).unwrap();
         let setup = scene.shallow().unwrap();
         let count = 1000;
@@ -114,7 +121,8 @@ mod tests {
             falling: Some(900),
             scalars: vec![("dye".into(), vec![0.0; count])],
         };
-        let arrays = surface.arrays(setup.output);
+        let colours = crate::scene::shallow::stage::colours::srgb(&vec![[0.0; 3]; count]);
+        let arrays: Vec<_> = surface.arrays(setup.output).into_iter().chain(colours).collect();
         let carried = Carried {
             velocities: &surface.velocities,
             uvs: None,

@@ -90,7 +90,7 @@ pub const KEYS: &[Key] = &[
     key(OUTPUT, "shallow", "skirts", Flag, or("true"))
         .means("true: where the ground ends, as at the edges of shelves and holes, the surface extends to that edge and comes down to it; false: it ends in the middle of the last cell, open below"),
     key(FIRST, "shallow", "stains", Flag, or("false"))
-        .means("for a mesh: true: the liquid leaves stains on it, and terrain/terrain.%04d.ply is the terrain (m, Y up) with an array `stain`, 0 to 1, on its vertices"),
+        .means("for a mesh: true: the liquid leaves stains on it, and terrain/ has the terrain at each frame (m, Y up) with an array `stain`, 0 to 1, on its vertices, and its colours under them"),
     key(STEP, "shallow", "stain_half_life", Number(1.0e-3, 1.0e12, "s"), or("60.0"))
         .means("time in which half of a stain on dry ground fades (s)"),
     key(OUTPUT, "shallow", "opaque_depth", Number(1.0e-6, FAR, "m"), or("0.001"))
@@ -182,10 +182,12 @@ pub const TABLE_ARRAY_KEYS: &[Key] = &[
         .means("true: smooth motion through the keys, from rest to rest; false: linear between them"),
     key(STEP, OBJECT, "keys", Poses(FAR), or("[]").such_as("[{ frame = 1, at = [0.05, 0.04, 0.0] }, { frame = 60, at = [-0.05, 0.04, 0.0], turn_deg = [0.0, 0.0, 90.0] }]"))
         .means("poses at frames: m, degrees about x, then y, then z; at most one for a file"),
-    key(OUTPUT, "output", "liquid", Choices(&["ply", "usd"]), or("[\"ply\"]"))
-        .means("\"ply\", \"usd\": liquid/, the surface at each frame"),
+    key(OUTPUT, "output", "liquid", Choices(&["ply", "usd"]), or("[\"usd\"]"))
+        .means("\"usd\" (in shot.usda), \"ply\": liquid/, the surface at each frame"),
     key(OUTPUT, "output", "attributes", Choices(&["v", "depth", "layer", "alpha", "falling", "scalars"]), or("[\"v\", \"depth\", \"layer\", \"alpha\", \"falling\", \"scalars\"]"))
         .means("of its vertices: velocity of the surface (m/s), depth (m), layer from the bottom, opacity: depth / opaque_depth up to 1; with falls, whether it is in the air; each scalar, by its name"),
+    key(OUTPUT, "output", "terrain", Choices(&["ply", "usd"]), or("[\"usd\"]"))
+        .means("\"usd\" (in shot.usda): terrain and obstacles, in surroundings.usdc or, if they move or are stained, in terrain/ and obstacles/; \"ply\": terrain/, a terrain that moves or is stained"),
     key(OUTPUT, "output", "volume", Choices(&["vdb"]), or("[]").such_as("[\"vdb\"]"))
         .means("\"vdb\": volume/volume.%04d.vdb: density, the liquid share of each voxel, which has the size of a cell"),
 ];

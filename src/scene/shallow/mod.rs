@@ -152,6 +152,10 @@ pub struct OutputFiles {
     pub usd: bool,
     /// `volume/volume.%04d.vdb`.
     pub vdb: bool,
+    /// `terrain/terrain.%04d.ply`: the terrain, if it moves or is stained.
+    pub terrain_ply: bool,
+    /// Terrain and obstacles in USD: `surroundings.usdc`, `terrain/terrain.%04d.usdc` and `obstacles/obstacles.%04d.usdc`.
+    pub terrain_usd: bool,
     /// Velocities of the surface.
     pub velocities: bool,
     /// Depths.
@@ -199,6 +203,8 @@ impl Shallow {
                 ply: output.holds("liquid", "ply"),
                 usd: output.holds("liquid", "usd"),
                 vdb: output.holds("volume", "vdb"),
+                terrain_ply: output.holds("terrain", "ply"),
+                terrain_usd: output.holds("terrain", "usd"),
                 velocities: output.holds("attributes", "v"),
                 depth: output.holds("attributes", "depth"),
                 layer: output.holds("attributes", "layer"),

@@ -48,8 +48,8 @@ pub const KEYS: &[Key] = &[
         .means("time in which half of the detail fades (s), except where the mesh's array `detail` is 1; left out: no detail fades with time"),
     key(STEP, "surface", "fade", Number(0.0, 1000.0, ""), or("0.0"))
         .means("how much detail fades where the mesh is stretched or pressed: to exp(-fade) while lengths change by a factor of e"),
-    key(OUTPUT, "output", "surface", Choices(&["ply", "usd", "obj"]), or("[\"ply\"]"))
-        .means("\"ply\", \"usd\", \"obj\": surface/, the mesh at each frame"),
+    key(OUTPUT, "output", "surface", Choices(&["ply", "usd", "obj"]), or("[\"usd\"]"))
+        .means("\"usd\" (in shot.usda), \"ply\", \"obj\": surface/, the mesh at each frame"),
     key(OUTPUT, "output", "attributes", Choices(&["v", "delta", "flagged", "rebuilt"]), or("[\"v\", \"delta\", \"flagged\", \"rebuilt\"]"))
         .means("of its vertices: velocity over the coming frame (m/s), distance kept from the particles' surface (m), 1 where flagged; of its faces: 1 where new, 2 where its texture is torn"),
 ];

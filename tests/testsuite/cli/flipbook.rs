@@ -217,10 +217,15 @@ fn what_cannot_be_drawn_is_said_before_anything_is_written() {
     for name in ["gap.gif", "gap.0003.png", "gap.0004.png"] {
         fs::remove_file(folder.join(name)).unwrap();
     }
-    // What a shot has and no picture shows.
+    // Binary USD is drawn as .ply is.
     works(folder, "snow shot.toml -o usd -q --frames 1 --set output.objects=[\"usd\"]");
     let said = works(folder, &format!("preview usd -o usd.png {SIZE}"));
-    assert!(said.contains("usd/objects: not drawn") && said.contains(".ply"), "{said}");
+    assert!(!said.contains("not drawn"), "{said}");
+    let drawn = ["shot/objects/objects.0001.ply", "usd/objects/objects.0001.usdc"].map(|file| {
+        works(folder, &format!("preview {file} -o objects.png {SIZE}"));
+        fs::read(folder.join("objects.png")).unwrap()
+    });
+    assert!(drawn[0] == drawn[1]);
     let left: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     let left: Vec<_> =
         left.iter().filter_map(|name| name.to_str()).filter(|name| name.starts_with("p.")).collect();

@@ -39,12 +39,14 @@ fn files_of_a_mesh_on_a_liquid_take_about_what_check_says() {
     let folder = &Folder::empty();
     liquid(folder, 8.0, 12);
     let all = "--set output.surface=[\"ply\",\"usd\",\"obj\"]";
-    for (out, options) in [("ply", ""), ("bare", "--set output.attributes=[]"), ("all", all)] {
+    let ply = "--set output.surface=[\"ply\"]";
+    for (out, options) in [("usd", ""), ("ply", ply), ("bare", "--set output.attributes=[]"), ("all", all)] {
         let said = report(folder, options);
         assert_eq!(number(&said, "disk_bytes"), 3.0 * number(&said, "frame_bytes"));
         works(folder, &format!("surface shot.toml -o {out} -q {options}"));
         let share = number(&said, "disk_bytes") / bytes_in(&folder.join(out)) as f64;
-        assert!((0.75..1.35).contains(&share), "{out}: {share} of what it takes");
+        // The indices of so small a mesh pack to less than is estimated.
+        assert!((0.75..1.4).contains(&share), "{out}: {share} of what it takes");
     }
     let text = works(folder, "check shot.toml");
     assert!(text.contains("memory    about ") && text.contains(" a frame\n"), "{text}");

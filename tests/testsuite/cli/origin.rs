@@ -135,7 +135,7 @@ fn are_the_same(plain: &Path, other: &Path, option: &str) {
         ("vdb sweep block.obj moved.obj OPTION --cell 0.05 -o c.vdb", "c.vdb"),
         ("vdb from-particles drop.xyz OPTION --spacing 0.125 -o d.vdb", "d.vdb"),
         ("mesh repair open.obj OPTION -o e.obj", "e.obj"),
-        ("shallow spill.toml -o f --threads 1", "f/liquid/liquid.0002.ply"),
+        ("shallow spill.toml -o f --threads 1", "f/liquid/liquid.0002.usdc"),
     ] {
         let outputs = [(plain, ""), (other, option)].map(|(folder, option)| {
             works(folder, &command.replace("OPTION", option));

@@ -77,7 +77,7 @@ fn a_new_scene_runs_as_it_is() {
     assert!(json(&folder.join("new/report/liquid.0004.json"))["sourced_ml"].as_f64().unwrap() > 0.0);
     // The scene beside the output makes the same again.
     works(folder, "shallow new/scene.toml -o again");
-    let file = |out: &str| fs::read(folder.join(out).join("liquid/liquid.0004.ply")).unwrap();
+    let file = |out: &str| fs::read(folder.join(out).join("liquid/liquid.0004.usdc")).unwrap();
     assert!(file("new") == file("again"));
 }
 
@@ -265,7 +265,7 @@ fn terrains_that_face_down_or_are_nothing_are_told() {
     mesh::write(&folder.join("dish.obj"), &dish.clone().reversed()).unwrap();
     let said = works(folder, "shallow spill.toml -o down");
     assert!(said.contains("its triangles face down: they are turned round"), "{said}");
-    let file = |out: &str| fs::read(folder.join(out).join("liquid/liquid.0003.ply")).unwrap();
+    let file = |out: &str| fs::read(folder.join(out).join("liquid/liquid.0003.usdc")).unwrap();
     assert!(file("up") == file("down"));
     // A wall has no surface that faces up.
     fs::write(folder.join("dish.obj"), "v 0 0 0\nv 0 1 0\nv 0 1 1\nf 1 2 3\n").unwrap();
@@ -294,10 +294,10 @@ fn an_image_of_heights_is_a_terrain_with_its_size() {
     assert!(said.contains("40 x 40 of 0.002 m") && said.contains("0.0800 x 0.0300 x 0.0800 m"), "{said}");
     works(folder, &format!("shallow spill.toml -o slope {size}"));
     // It flows towards black.
-    let liquid = mesh::read(&folder.join("slope/liquid/liquid.0003.ply")).unwrap();
+    let liquid = mesh::read(&folder.join("slope/liquid/liquid.0003.usdc")).unwrap();
     let middle =
         |mesh: &TriMesh| mesh.positions.iter().map(|p| p.x).sum::<f32>() / mesh.positions.len() as f32;
-    let before = mesh::read(&folder.join("slope/liquid/liquid.0001.ply")).unwrap();
+    let before = mesh::read(&folder.join("slope/liquid/liquid.0001.usdc")).unwrap();
     assert!(middle(&liquid) < middle(&before) - 0.0005, "{} from {}", middle(&liquid), middle(&before));
     works(folder, "preview slope -o slope.png --size 32x24");
 }

@@ -90,7 +90,7 @@ fn the_demonstration_tracks_a_coarse_jelly() {
     }
     let first = jelly.paint();
     for frame in 1..=FRAMES {
-        let path = folder.join(format!("liquid/surface/surface.{frame:04}.ply"));
+        let path = folder.join(format!("liquid/surface/surface.{frame:04}.usdc"));
         let tracked = mesh::read_detailed(&path).unwrap();
         assert_eq!(tracked.mesh.triangles, jelly.mesh.triangles);
         // Written with 32 bits.

@@ -71,7 +71,7 @@ fn what_falls_and_what_it_carries_add_up_and_are_in_the_mesh() {
     let run: Value = serde_json::from_slice(&fs::read(folder.join("run.json")).unwrap()).unwrap();
     assert_eq!(run["falling_ml"], last["falling_ml"]);
     // The drops are behind the surface: they fly between the shelf and the floor, and are of milk.
-    let liquid = mesh::read_detailed(&folder.join("out/liquid/liquid.0030.ply")).unwrap();
+    let liquid = mesh::read_detailed(&folder.join("out/liquid/liquid.0030.usdc")).unwrap();
     let [falling, milk, age, depth] =
         ["falling", "milk", "age", "depth"].map(|name| liquid.of_vertices(name).unwrap());
     let heat = liquid.of_vertices("heat").unwrap();
@@ -106,7 +106,7 @@ fn a_shot_that_falls_and_carries_resumes_to_the_same_bytes() {
     write_shot(folder, FALLS, &format!("{CARRIED}{tool}"));
     let shot = "shallow spill.toml";
     works(folder, &format!("{shot} -o whole"));
-    kill_at(folder, &format!("{shot} -o killed"), "killed/liquid/liquid.0014.ply");
+    kill_at(folder, &format!("{shot} -o killed"), "killed/liquid/liquid.0014.usdc");
     works(folder, &format!("{shot} -o killed"));
     are_same(folder, "whole", "killed");
     works(folder, &format!("{shot} -o one --threads 1"));
@@ -116,7 +116,7 @@ fn a_shot_that_falls_and_carries_resumes_to_the_same_bytes() {
     are_same(folder, "whole", "baseline");
     // The scene beside the output has all of it.
     works(folder, "shallow whole/scene.toml -o again");
-    let last = |out: &str| fs::read(folder.join(out).join("liquid/liquid.0030.ply")).unwrap();
+    let last = |out: &str| fs::read(folder.join(out).join("liquid/liquid.0030.usdc")).unwrap();
     assert!(last("whole") == last("again"));
     // What sources bring may be another thing from a frame on; what falls, and what there is to carry, may not.
     for set in [
@@ -158,7 +158,7 @@ fn bumps_of_a_mesh_do_not_show_through_films() {
     fs::write(folder.join("spill.toml"), scene).unwrap();
     // Mean height of wet vertices of the last frame.
     let height = |out: &str| {
-        let liquid = mesh::read_detailed(&folder.join(out).join("liquid/liquid.0004.ply")).unwrap();
+        let liquid = mesh::read_detailed(&folder.join(out).join("liquid/liquid.0004.usdc")).unwrap();
         let depths = liquid.of_vertices("depth").unwrap();
         let wet = liquid.mesh.positions.iter().zip(&depths).filter(|(_, depth)| **depth > 1e-4);
         let heights: Vec<f32> = wet.map(|(position, _)| position.y).collect();
@@ -190,9 +190,9 @@ fn liquid_that_thickens_and_that_walls_hold_back_runs_less_far_and_resumes() {
     works(folder, &format!("{shot} -o thin --set scalar.2.thickens_times=1"));
     works(folder, &format!("{shot} -o walls --set shallow.friction=walls"));
     assert!(wet("thick") + 20 < wet("thin"), "{} and {} columns", wet("thick"), wet("thin"));
-    let last = |out: &str| fs::read(folder.join(out).join("liquid/liquid.0030.ply")).unwrap();
+    let last = |out: &str| fs::read(folder.join(out).join("liquid/liquid.0030.usdc")).unwrap();
     assert!(last("walls") != last("thick"));
-    kill_at(folder, &format!("{shot} -o killed"), "killed/liquid/liquid.0014.ply");
+    kill_at(folder, &format!("{shot} -o killed"), "killed/liquid/liquid.0014.usdc");
     works(folder, &format!("{shot} -o killed"));
     are_same(folder, "thick", "killed");
     // How it thickens and rests may be another from a frame on; where friction acts may not.
@@ -226,7 +226,7 @@ fn liquid_stains_the_terrain_and_resumes_with_its_stains() {
     works(folder, &format!("{shot} -o whole"));
     let stains = |out: &str, frame: u32| {
         let terrain =
-            mesh::read_detailed(&folder.join(out).join(format!("terrain/terrain.{frame:04}.ply"))).unwrap();
+            mesh::read_detailed(&folder.join(out).join(format!("terrain/terrain.{frame:04}.usdc"))).unwrap();
         assert_eq!(terrain.mesh.triangles, floor.triangles);
         assert_eq!(terrain.mesh.positions, floor.positions);
         terrain.of_vertices("stain").unwrap()
@@ -237,7 +237,7 @@ fn liquid_stains_the_terrain_and_resumes_with_its_stains() {
     // Where it was poured it has stood for 29 frames: 1 - exp(-29 / 60 / 0.2) of a stain.
     let at = last[(20 * count + 25) as usize];
     assert!((at - 0.911).abs() < 0.01 && last[0] == 0.0, "{at}");
-    kill_at(folder, &format!("{shot} -o killed"), "killed/liquid/liquid.0014.ply");
+    kill_at(folder, &format!("{shot} -o killed"), "killed/liquid/liquid.0014.usdc");
     works(folder, &format!("{shot} -o killed"));
     are_same(folder, "whole", "killed");
     assert_eq!(last, stains("killed", 30));

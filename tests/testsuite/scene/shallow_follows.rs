@@ -39,7 +39,7 @@ fn write_ground(folder: &Path, frames: i32, ground: impl Fn(i32) -> TriMesh) {
 
 /// Positions of the surface at a frame, each with its depth (m) and layer.
 fn surface(folder: &Path, out: &str, frame: i32) -> Vec<(Vec3, f64, f64)> {
-    let surface = mesh::read_detailed(&folder.join(format!("{out}/liquid/liquid.{frame:04}.ply"))).unwrap();
+    let surface = mesh::read_detailed(&folder.join(format!("{out}/liquid/liquid.{frame:04}.usdc"))).unwrap();
     let of = |name: &str| surface.of_vertices(name).unwrap();
     let numbers = of("depth").into_iter().zip(of("layer"));
     surface

@@ -85,7 +85,7 @@ fn all_liquid_is_accounted_for_and_points_act_at_their_frames() {
     let absorbed = ml(&report(folder, "out", 8))[4];
     assert!((0.05..=0.1 + 1e-9).contains(&absorbed), "{absorbed} ml are in the gauze");
     // The surface carries what it is asked for.
-    let surface = mesh::read_detailed(&folder.join("out/liquid/liquid.0008.ply")).unwrap();
+    let surface = mesh::read_detailed(&folder.join("out/liquid/liquid.0008.usdc")).unwrap();
     let names: Vec<&str> = surface.arrays.iter().map(|array| &*array.name).collect();
     assert_eq!(names, ["vx", "vy", "vz", "depth", "alpha", "layer"]);
     let of = |name: &str| surface.of_vertices(name).unwrap();
@@ -118,7 +118,7 @@ pub fn resume_in_every_way(folder: &Path) {
     works(folder, &format!("{shot} -o whole --threads 2"));
     works(folder, &format!("{shot} -o one --threads 1"));
     are_same(folder, "whole", "one");
-    kill_at(folder, &format!("{shot} -o killed"), "killed/liquid/liquid.0003.ply");
+    kill_at(folder, &format!("{shot} -o killed"), "killed/liquid/liquid.0003.usdc");
     works(folder, &format!("{shot} -o killed"));
     are_same(folder, "whole", "killed");
     works(folder, &format!("{shot} -o part --frames 5-6"));
@@ -180,7 +180,7 @@ fn a_run_goes_on_with_other_settings_but_not_on_another_terrain() {
     works(folder, "shallow spill.toml -o long --set shot.frames=1-11");
     write_shot(folder, "", LIQUID);
     works(folder, "shallow spill.toml -o at_once --set shot.frames=1-11");
-    let frame = |out: &str| fs::read(folder.join(out).join("liquid/liquid.0011.ply")).unwrap();
+    let frame = |out: &str| fs::read(folder.join(out).join("liquid/liquid.0011.usdc")).unwrap();
     assert!(frame("long") == frame("at_once"), "the last frame differs");
 }
 
@@ -201,7 +201,7 @@ fn a_terrain_that_moves_loses_nothing() {
         let error = poured + sourced - drained - absorbed - lost - inside;
         assert!(error.abs() < 1e-9 && report["missing_units"] == 0 && lost == 0.0, "{report}");
     }
-    kill_at(folder, &format!("{shot} -o killed"), "killed/liquid/liquid.0004.ply");
+    kill_at(folder, &format!("{shot} -o killed"), "killed/liquid/liquid.0004.usdc");
     works(folder, &format!("{shot} -o killed"));
     are_same(folder, "whole", "killed");
     works(folder, "preview whole --frames 1-24x23 -o p.%04d.png --size 32x24");

@@ -78,8 +78,8 @@ fn points_that_can_be_no_grains_are_refused_before_the_base_is_made() {
     let at = &folder("initial = \"drift.ply\"", "");
     let good = ["0", "0.5", "0", "0", "0", "0"];
     for (point, words) in [
-        (["nan", "0.5", "0", "0", "0", "0"], ["the position of point 2", "is not finite"]),
-        (["0", "inf", "0", "0", "0", "0"], ["the position of point 2", "is not finite"]),
+        (["nan", "0.5", "0", "0", "0", "0"], ["the position of particle 2", "is not finite"]),
+        (["0", "inf", "0", "0", "0", "0"], ["the position of particle 2", "is not finite"]),
         (["0", "0.5", "1e15", "0", "0", "0"], ["point 2", "too far from the origin"]),
         (["0", "0.5", "0", "0", "nan", "0"], ["the velocity of point 2", "is not finite"]),
         (["0", "0.5", "0", "1e30", "0", "0"], ["the velocity of point 2", "10000 m/s"]),

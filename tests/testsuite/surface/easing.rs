@@ -168,7 +168,7 @@ fn threads_kills_and_frames_made_again_give_the_same_bytes() {
     let mut plain = command(folder, &format!("{shot} -o baseline"));
     assert!(plain.env("FRAZIL_CPU", "baseline").status().unwrap().success());
     are_same(&whole, &path("baseline"), |_| true);
-    kill_at(folder, &format!("{shot} -o killed"), "killed/surface/surface.0005.ply");
+    kill_at(folder, &format!("{shot} -o killed"), "killed/surface/surface.0005.usdc");
     works(folder, &format!("{shot} -o killed"));
     are_same(&whole, &path("killed"), |_| true);
     works(folder, &format!("{shot} -o part --frames 5-6"));
@@ -188,7 +188,7 @@ fn a_shot_sees_what_its_cache_has_beyond_it_also_when_that_comes_later() {
     works(folder, &format!("{SHOT} -o whole"));
     works(folder, &format!("{SHORT} -o short"));
     let bytes = |out: &str, number: i32| {
-        fs::read(folder.join(format!("{out}/surface/surface.{number:04}.ply"))).unwrap()
+        fs::read(folder.join(format!("{out}/surface/surface.{number:04}.usdc"))).unwrap()
     };
     for number in 1..=EARLIER {
         assert!(bytes("whole", number) == bytes("short", number), "frame {number}");

@@ -35,13 +35,13 @@ fn frames_without_particles_get_empty_meshes_and_liquid_comes_back() {
     let said = works(folder, make);
     assert!(said.contains("p.0006.bgeo: holds no particles"), "{said}");
     works(folder, "surface -p p.%04d.bgeo --spacing 0.1 -o out");
-    works(folder, "convert out/surface/surface.%04d.ply b.%04d.obj --frames 1-9");
-    works(folder, "preview out/surface/surface.%04d.ply -o c.%04d.png --frames 1-9 --size 32x32");
+    works(folder, "convert out/surface/surface.%04d.usdc b.%04d.obj --frames 1-9");
+    works(folder, "preview out/surface/surface.%04d.usdc -o c.%04d.png --frames 1-9 --size 32x32");
     for number in 1..=9 {
         let count = |name: String| triangles(&folder.join(name)).unwrap();
         let names = [
             format!("a.{number:04}.ply"),
-            format!("out/surface/surface.{number:04}.ply"),
+            format!("out/surface/surface.{number:04}.usdc"),
             format!("b.{number:04}.obj"),
         ];
         names.into_iter().for_each(|name| assert_eq!(count(name.clone()) > 0, is_full(number), "{name}"));
@@ -58,7 +58,7 @@ fn frames_without_particles_get_empty_meshes_and_liquid_comes_back() {
 fn are_same(folder: &Path, run: &str, frames: RangeInclusive<i32>) {
     for frame in frames {
         let read =
-            |run: &str| fs::read(folder.join(format!("{run}/surface/surface.{frame:04}.ply"))).unwrap();
+            |run: &str| fs::read(folder.join(format!("{run}/surface/surface.{frame:04}.usdc"))).unwrap();
         assert!(read("out") == read(run), "frame {frame} of {run}");
     }
 }
@@ -69,7 +69,7 @@ fn frames_before_a_missing_file_are_made_and_the_rest_when_it_comes() {
     (1..=8).filter(|number| *number != 6).for_each(|number| write(folder, number, true));
     let run = "surface -p p.%04d.bgeo --spacing 0.1 -o out --set shot.frames=1-8";
     fails(folder, run, 1, &["p.0006.bgeo"]);
-    let made = |number: i32| triangles(&folder.join(format!("out/surface/surface.{number:04}.ply")));
+    let made = |number: i32| triangles(&folder.join(format!("out/surface/surface.{number:04}.usdc")));
     assert!((1..=5).all(|number| made(number) > Some(0)) && (6..=8).all(|number| made(number).is_none()));
     write(folder, 6, true);
     works(folder, run);

@@ -159,7 +159,7 @@ fn far_is_as_it_was(now: &DetailedMesh, first: &DetailedMesh, frame: i32) {
 fn balls_meet_and_part_and_the_rest_of_the_mesh_stays_as_it_is() {
     let folder = &Folder::empty();
     let first = write_shot(folder);
-    let said = works(folder, &format!("{SHOT} -o out"));
+    let said = works(folder, &format!("{SHOT} -o out --set output.surface=[\"ply\"]"));
     assert!(!said.contains("repaired"), "{said}");
     let (mut parts, mut rebuilt, mut made) = (Vec::new(), 0, 0);
     // Frames in which more than the cells at fault, and those that they need, had to be rebuilt.
@@ -242,7 +242,7 @@ fn threads_kills_and_frames_made_again_give_the_same_bytes() {
     let path = |out: &str| folder.join(out);
     works(folder, &format!("{shot} -o one --threads 1"));
     are_same(&whole, &path("one"), |_| true);
-    kill_at(folder, &format!("{shot} -o killed"), "killed/surface/surface.0006.ply");
+    kill_at(folder, &format!("{shot} -o killed"), "killed/surface/surface.0006.usdc");
     works(folder, &format!("{shot} -o killed"));
     are_same(&whole, &path("killed"), |_| true);
     // Resumed from a mesh that was rebuilt. Records say from which frame on it was made again.
@@ -256,7 +256,7 @@ fn threads_kills_and_frames_made_again_give_the_same_bytes() {
 fn a_mesh_that_is_not_rebuilt_keeps_its_triangles_and_is_flagged() {
     let folder = &Folder::empty();
     let first = write_shot(folder);
-    works(folder, &format!("{MEETING} -o out --set surface.rebuild=false"));
+    works(folder, &format!("{MEETING} -o out --set surface.rebuild=false --set output.surface=[\"ply\"]"));
     let mut flagged = 0;
     for number in 1..=14 {
         let now = frame(folder, "out", number);

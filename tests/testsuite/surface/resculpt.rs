@@ -100,7 +100,7 @@ fn a_mesh_that_was_sculpted_takes_the_position_of_the_tracked_one() {
     }
     // Nothing before it knows of it: not even velocities.
     for number in 1..=2 {
-        let name = format!("surface/surface.{number:04}.ply");
+        let name = format!("surface/surface.{number:04}.usdc");
         let [plain, out] = ["plain", "out"].map(|run| fs::read(folder.join(run).join(&name)).unwrap());
         assert!(plain == out, "frame {number}");
     }
@@ -196,7 +196,7 @@ fn threads_kills_and_frames_made_again_give_the_same_bytes() {
         let whole = output(&folder.join("whole"));
         works(folder, &format!("{shot} -o one --threads 1"));
         are_same(&whole, &folder.join("one"), |_| true);
-        kill_at(folder, &format!("{shot} -o killed"), "killed/surface/surface.0002.ply");
+        kill_at(folder, &format!("{shot} -o killed"), "killed/surface/surface.0002.usdc");
         works(folder, &format!("{shot} -o killed"));
         are_same(&whole, &folder.join("killed"), |_| true);
         for from in [6, 4, 3] {

@@ -64,7 +64,8 @@ const SHOT: &str = "surface -p ball.%04d.bgeo -m ball.ply --spacing 0.01 --set s
 fn the_mesh_moves_with_its_velocities_and_keeps_what_it_carries() {
     let folder = &Folder::empty();
     let ball = write_shot(folder, 6);
-    let said = works(folder, &format!("{SHOT} -o out --report run.json"));
+    let said =
+        works(folder, &format!("{SHOT} -o out --report run.json --set output.surface=[\"ply\",\"usd\"]"));
     assert!(!said.contains("estimated"), "{said}");
     let before = detailed(&ball.mesh);
     for number in 1..=6 {
@@ -98,7 +99,7 @@ fn the_mesh_moves_with_its_velocities_and_keeps_what_it_carries() {
     assert_eq!((report["frames"].as_u64(), report["most_flagged"].as_u64()), (Some(6), Some(0)));
     works(folder, "preview out --frame 3 -o plain.png --size 64x48");
     works(folder, "preview out --frame 3 -o delta.png --size 64x48 --color delta");
-    works(folder, "preview out/surface/surface.0003.ply -o v.png --size 64x48 --color v");
+    works(folder, "preview out/surface/surface.0003.usdc -o v.png --size 64x48 --color v");
     assert!(fs::read(folder.join("plain.png")).unwrap() != fs::read(folder.join("delta.png")).unwrap());
     fails(folder, "preview out --frame 3 -o no.png --color heat", 2, &["--color heat", "array"]);
     let checked = works(folder, "check out");
@@ -119,7 +120,7 @@ fn threads_kills_and_another_order_of_frames_give_the_same_bytes() {
         whole.iter().for_each(|(name, bytes)| assert!(*bytes == other[name], "{name} of {out}"));
     };
     same("one");
-    kill_at(folder, &format!("{shot} -o killed"), "killed/surface/surface.0003.ply");
+    kill_at(folder, &format!("{shot} -o killed"), "killed/surface/surface.0003.usdc");
     works(folder, &format!("{shot} -o killed"));
     same("killed");
     works(folder, &format!("{shot} -o part --frames 5-6"));
@@ -215,7 +216,7 @@ fn what_a_mesh_cannot_follow_is_refused_with_the_file() {
     fails(folder, &format!("{SHOT} -o cut"), 1, &["ball.0002.bgeo"]);
     fs::remove_file(folder.join("ball.0002.bgeo")).unwrap();
     fails(folder, &format!("{SHOT} -o gap"), 1, &["ball.0002.bgeo"]);
-    assert!(folder.join("gap/surface/surface.0001.ply").exists());
+    assert!(folder.join("gap/surface/surface.0001.usdc").exists());
     // Scenes of one system are not for the command of another.
     fs::write(
         folder.join("shot.toml"),
@@ -292,7 +293,7 @@ fn what_lies_beyond_the_shot_does_not_keep_its_last_frame() {
     fs::copy(folder.join("ball.0004.bgeo"), folder.join("ball.0007.bgeo")).unwrap();
     // A gap on the way to the frame behind the last one.
     works(folder, &format!("{SHOT} -o gap --set shot.frames=1-2 --set surface.speed=3"));
-    assert!(folder.join("gap/surface/surface.0002.ply").exists());
+    assert!(folder.join("gap/surface/surface.0002.usdc").exists());
     // A file that is being written.
     let bytes = fs::read(folder.join("ball.0004.bgeo")).unwrap();
     fs::write(folder.join("ball.0004.bgeo"), &bytes[..bytes.len() / 2]).unwrap();

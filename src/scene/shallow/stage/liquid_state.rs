@@ -1,6 +1,7 @@
 //! The liquid of a scene, and how it advances from frame to frame.
 
 use super::saved_liquid;
+use super::surroundings_usd::TerrainFrame;
 use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::TriMesh;
@@ -158,15 +159,18 @@ impl<'a> LiquidState<'a> {
         Ok(moved)
     }
 
-    /// The terrain with the stain of each of its vertices; `None` if nothing stains it.
+    /// The terrain at this frame, with its stains; `None` if it is not known as a mesh.
     ///
     /// # Errors
     /// None for its own stains.
-    pub fn stained(&self) -> Result<Option<(TriMesh, Vec<f32>)>> {
-        let Some((stains, mesh)) = self.stains.as_ref().zip(self.terrain()) else { return Ok(None) };
-        let mut out = vec![0.0; stains.len()];
-        stains.stains(&mut out)?;
-        Ok(Some((mesh.clone(), out)))
+    pub fn terrain_frame(&self) -> Result<Option<TerrainFrame>> {
+        let Some(mesh) = self.terrain() else { return Ok(None) };
+        let values = |stains: &Stains| {
+            let mut out = vec![0.0; stains.len()];
+            stains.stains(&mut out).map(|()| out)
+        };
+        let stains = self.stains.as_ref().map(values).transpose()?;
+        Ok(Some(TerrainFrame { mesh: mesh.clone(), stains }))
     }
 
     /// The terrain's mesh at this frame; `None` if it has none, or none that is needed ([`Inputs::still_terrain`]).

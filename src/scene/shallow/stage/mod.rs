@@ -1,10 +1,12 @@
 //! The stage `liquid`: a little liquid flows over a terrain.
 
+pub(in crate::scene::shallow) mod colours;
 pub(in crate::scene::shallow) mod liquid_mesh;
 pub(in crate::scene::shallow) mod liquid_state;
 #[cfg(feature = "vdb")]
 mod liquid_volume;
 mod saved_liquid;
+mod surroundings_usd;
 
 use serde_json::json;
 
@@ -12,11 +14,10 @@ use super::inputs::scalars;
 use super::{Inputs, ML, ROLES, Shallow};
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
-use crate::geometry::mesh::attributes::{Number, On};
-use crate::geometry::{MeshArray, TriMesh};
+use crate::geometry::MeshArray;
 use crate::io::mesh;
 use crate::io::usd::materials::Look;
-use crate::io::usd::{ClipPrims, Clips, ContentsByName, MeshPrim, Shading, primvars};
+use crate::io::usd::{ClipPrims, Clips, ContentsByName, MeshPrim, Shading, StillMeshes, primvars};
 use crate::scene::Scene;
 use crate::scene::run::settings::{settings_of, settings_of_first_state};
 use crate::scene::run::{
@@ -25,15 +26,18 @@ use crate::scene::run::{
 };
 use crate::shallow;
 use crate::shallow::remap::Moved;
+use crate::shallow::terrain::shapes::Shape;
 use liquid_mesh::{LiquidMesh, Mesher};
 use liquid_state::LiquidState;
+use surroundings_usd::{
+    OBSTACLES, SURROUNDINGS, TERRAIN, TerrainFrame, obstacle_prims, obstacles_file, still_meshes,
+    terrain_prims,
+};
 
 /// Name of the stage, and of the kind of its files.
 const NAME: &str = "liquid";
 /// Kind of the volume files.
 const VOLUME: &str = "volume";
-/// Kind of the files of a stained terrain.
-const TERRAIN: &str = "terrain";
 
 /// The stage for a scene.
 pub struct Liquid<'a> {
@@ -54,8 +58,10 @@ pub struct FrameData {
     state: Vec<u8>,
     /// A .vdb file, and its contents.
     volume: Option<(Vec<u8>, ContentsByName)>,
-    /// The terrain and its stains.
-    terrain: Option<(TriMesh, Vec<f32>)>,
+    /// The terrain, if it changes and is written.
+    terrain: Option<TerrainFrame>,
+    /// The obstacles with keys, if they are written.
+    shapes: Vec<Shape>,
 }
 
 impl<'a> Liquid<'a> {
@@ -113,7 +119,19 @@ impl<'a> Liquid<'a> {
             liquid,
             liquid_state.stains.as_ref(),
         );
-        Ok(FrameData { surface, state, volume, terrain: liquid_state.stained()? })
+        let terrain = if self.writes(TERRAIN) { liquid_state.terrain_frame()? } else { None };
+        let shapes = if self.writes(OBSTACLES) { liquid_state.shapes.clone() } else { Vec::new() };
+        Ok(FrameData { surface, state, volume, terrain, shapes })
+    }
+
+    /// Whether the terrain moves or is stained, so that it has a file for each frame.
+    fn terrain_changes(&self) -> bool {
+        self.setup.sequence().is_some() || self.setup.staining.is_some()
+    }
+
+    /// Count of the obstacles with keys.
+    fn obstacles_with_keys(&self) -> usize {
+        self.setup.obstacles.iter().filter(|obstacle| obstacle.file().is_none()).count()
     }
 
     /// The liquid's material in USD.
@@ -140,7 +158,8 @@ impl Stage for Liquid<'_> {
         &[
             FileKind { name: NAME, extensions: &["ply", "usdc", "usda"] },
             FileKind { name: VOLUME, extensions: &["vdb"] },
-            FileKind { name: TERRAIN, extensions: &["ply"] },
+            FileKind { name: TERRAIN, extensions: &["ply", "usdc"] },
+            FileKind { name: OBSTACLES, extensions: &["usdc"] },
         ]
     }
 
@@ -148,7 +167,8 @@ impl Stage for Liquid<'_> {
         let output = self.setup.output;
         match kind {
             VOLUME => output.vdb,
-            TERRAIN => self.setup.staining.is_some(),
+            TERRAIN => self.terrain_changes() && (output.terrain_ply || output.terrain_usd),
+            OBSTACLES => self.obstacles_with_keys() > 0 && output.terrain_usd,
             _ => output.ply || output.usd,
         }
     }
@@ -161,8 +181,11 @@ impl Stage for Liquid<'_> {
         true
     }
 
-    fn usd_kind(&self) -> Option<&'static str> {
-        self.setup.output.usd.then_some(NAME)
+    fn usd_kinds(&self) -> Vec<&'static str> {
+        let output = self.setup.output;
+        let liquid = output.usd.then_some(NAME);
+        let surroundings = output.terrain_usd.then_some([TERRAIN, OBSTACLES, SURROUNDINGS]);
+        liquid.into_iter().chain(surroundings.into_iter().flatten()).collect()
     }
 
     fn settings(&self) -> Result<Settings> {
@@ -201,12 +224,22 @@ impl Stage for Liquid<'_> {
         Vec::new()
     }
 
-    fn clip(&self) -> Option<Clips<'_>> {
+    fn clips(&self) -> Vec<Clips<'_>> {
         let arrays = LiquidMesh::empty(self.setup).arrays(self.setup.output);
         let primvars = primvars::primvars(&arrays.iter().collect::<Vec<&MeshArray>>());
         let (name, look, shading) = (NAME.into(), self.look(), Shading::Smooth);
         let mesh = MeshPrim { name, look, moves: true, uvs: None, primvars, shading };
-        Some(Clips::new(NAME, ClipPrims::Meshes(vec![mesh])))
+        let terrain = terrain_prims(self.setup.staining.is_some(), self.look());
+        let obstacles = obstacle_prims(self.obstacles_with_keys());
+        let kinds = [(NAME, vec![mesh]), (TERRAIN, terrain), (OBSTACLES, obstacles)];
+        kinds.map(|(kind, meshes)| Clips::new(kind, ClipPrims::Meshes(meshes))).into()
+    }
+
+    fn still_meshes(&self, ctx: &Context) -> Result<Option<StillMeshes>> {
+        match self.setup.output.terrain_usd {
+            true => still_meshes(ctx, self.scene, !self.terrain_changes()),
+            false => Ok(None),
+        }
     }
 }
 
@@ -250,7 +283,7 @@ impl<'a> Stepping for Liquid<'a> {
     }
 
     fn write(&self, _writer: &mut (), step: Self::Step, files: Option<&mut FrameFiles>) -> Result<()> {
-        let (Some(FrameData { surface, state, volume, terrain }), Some(files)) = (step, files) else {
+        let (Some(FrameData { surface, state, volume, terrain, shapes }), Some(files)) = (step, files) else {
             return Ok(());
         };
         let output = self.setup.output;
@@ -258,6 +291,12 @@ impl<'a> Stepping for Liquid<'a> {
         let arrays: Vec<&MeshArray> = arrays.iter().collect();
         if output.ply {
             let velocities = if output.velocities { &surface.velocities[..] } else { &[] };
+            // Programs take an opacity only together with a colour.
+            let colours =
+                vec![self.look().colour(); if output.alpha { surface.mesh.positions.len() } else { 0 }];
+            let colours = colours::srgb(&colours);
+            let coloured = arrays.iter().copied().chain(colours.iter().filter(|_| output.alpha));
+            let arrays: Vec<&MeshArray> = coloured.collect();
             let carried = mesh::Carried { velocities, uvs: None, arrays: &arrays };
             files.save(NAME, "ply", &mesh::ply_bytes(&surface.mesh, &carried))?;
         }
@@ -269,11 +308,16 @@ impl<'a> Stepping for Liquid<'a> {
             files.save(VOLUME, "vdb", &bytes)?;
             files.describe(VOLUME, &contents);
         }
-        if let Some((mesh, stains)) = terrain {
-            let values = stains.into_iter().map(f64::from).collect();
-            let stain = MeshArray { name: "stain".into(), on: On::Vertices, number: Number::F32, values };
-            let carried = mesh::Carried { velocities: &[], uvs: None, arrays: &[&stain] };
-            files.save(TERRAIN, "ply", &mesh::ply_bytes(&mesh, &carried))?;
+        if let Some(terrain) = terrain {
+            if output.terrain_ply {
+                files.save(TERRAIN, "ply", &terrain.ply(self.look()))?;
+            }
+            if output.terrain_usd {
+                files.save_usd(TERRAIN, terrain.usd(files.frame, self.scene.shot.fps, self.look()))?;
+            }
+        }
+        if !shapes.is_empty() {
+            files.save_usd(OBSTACLES, obstacles_file(&shapes, files.frame, self.scene.shot.fps))?;
         }
         files.save_state(&state)
     }

@@ -209,13 +209,15 @@ impl Stage for Grains<'_> {
         Reads { files: moving::files(self.scene, frame), ahead: Vec::new() }
     }
 
-    fn usd_kind(&self) -> Option<&'static str> {
-        self.scene.output.grains_usd.then_some("grains")
+    fn usd_kinds(&self) -> Vec<&'static str> {
+        self.scene.output.grains_usd.then_some("grains").into_iter().collect()
     }
 
-    fn clip(&self) -> Option<Clips<'_>> {
-        let grains = grains::Grains::new(params(self.scene, self.inputs.snow.cell)).ok()?;
-        Some(Clips::new("grains", ClipPrims::Points(for_clips(grains.points()))))
+    fn clips(&self) -> Vec<Clips<'_>> {
+        let grains = grains::Grains::new(params(self.scene, self.inputs.snow.cell));
+        let clips =
+            |grains: grains::Grains| Clips::new("grains", ClipPrims::Points(for_clips(grains.points())));
+        grains.ok().map(clips).into_iter().collect()
     }
 
     fn needs_every_frame(&self) -> Option<&'static str> {

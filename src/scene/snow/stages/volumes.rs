@@ -256,8 +256,8 @@ impl Stage for Volumes<'_> {
         Keeps::Whole
     }
 
-    fn usd_kind(&self) -> Option<&'static str> {
-        self.output.mesh_usd.then_some("mesh")
+    fn usd_kinds(&self) -> Vec<&'static str> {
+        self.output.mesh_usd.then_some("mesh").into_iter().collect()
     }
 
     fn volumes(&self) -> Vec<Volume> {
@@ -282,12 +282,13 @@ impl Stage for Volumes<'_> {
         fog.chain(self.output.snow.then_some(snow)).collect()
     }
 
-    fn clip(&self) -> Option<Clips<'_>> {
+    fn clips(&self) -> Vec<Clips<'_>> {
         // A different mesh at each frame, without velocities.
         let (name, primvars) = (MESH.into(), Vec::new());
         let mesh =
             MeshPrim { name, look: Look::Snow, moves: false, uvs: None, primvars, shading: Shading::Smooth };
-        self.output.mesh_usd.then(|| Clips::new("mesh", ClipPrims::Meshes(vec![mesh])))
+        let clips = || Clips::new("mesh", ClipPrims::Meshes(vec![mesh]));
+        self.output.mesh_usd.then(clips).into_iter().collect()
     }
 }
 

@@ -102,8 +102,8 @@ impl Stage for Track<'_> {
         true
     }
 
-    fn usd_kind(&self) -> Option<&'static str> {
-        self.surface.output.usd.then_some(NAME)
+    fn usd_kinds(&self) -> Vec<&'static str> {
+        self.surface.output.usd.then_some(NAME).into_iter().collect()
     }
 
     fn settings(&self) -> Result<Settings> {
@@ -128,14 +128,14 @@ impl Stage for Track<'_> {
         reads(self.scene, self.surface, self.inputs, frame)
     }
 
-    fn clip(&self) -> Option<Clips<'_>> {
+    fn clips(&self) -> Vec<Clips<'_>> {
         let (mesh, frame_arrays) = (&self.inputs.mesh, self.arrays(&[], &[], Some(0)));
         let arrays: Vec<&MeshArray> = self.carried(mesh).chain(&frame_arrays).collect();
         let primvars = primvars::primvars(&arrays);
         let uvs = mesh.uvs.as_ref();
         let (name, shading) = (NAME.into(), Shading::Smooth);
         let mesh = MeshPrim { name, look: Look::Object, moves: true, uvs, primvars, shading };
-        Some(Clips::new(NAME, ClipPrims::Meshes(vec![mesh])))
+        vec![Clips::new(NAME, ClipPrims::Meshes(vec![mesh]))]
     }
 }
 
