@@ -1,6 +1,7 @@
 //! Flipbooks: a picture of each frame, or a GIF of all of them, from one camera in one light.
 
 use std::path::Path;
+use std::time::Instant;
 
 use super::drawing::{Drawing, Look, View};
 use super::in_order::in_order;
@@ -8,7 +9,8 @@ use super::sources::Sources;
 use crate::cli::frame_results::FrameResults;
 use crate::cli::preview::parts::Part;
 use crate::cli::session::{Failure, OrFailure, Session};
-use crate::cli::shot::progress::FrameProgress;
+use crate::cli::shot::progress::{FrameProgress, ProgressFormat};
+use crate::cli::shot::remaining::Remaining;
 use frazil::io::files::atomic;
 use frazil::io::files::sequence::Pattern;
 use frazil::render::{Gif, Palette, Picture, delays};
@@ -158,7 +160,9 @@ impl<'a> Flipbook<'a> {
         let make = |_, parts: Result<_>| {
             Ok(parts.and_then(|parts| finish(view.draw(ctx, &look.build(ctx, parts)?)?)))
         };
-        let mut progress = FrameProgress::new(ctx, frames.len(), 0, session.is_quiet());
+        let pictures = Remaining::of(&[("picture", frames.len())], Instant::now());
+        let format = ProgressFormat::Text.unless(session.is_quiet());
+        let mut progress = FrameProgress::new(ctx, pictures, 0, format);
         let at_once = ctx.pool().threads().min(MAX_AT_ONCE);
         in_order(frames.len(), at_once, read, make, |index, made| {
             if take(index, made)?.is_some() {

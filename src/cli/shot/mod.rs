@@ -1,6 +1,7 @@
 //! Shared by the commands that make shots.
 
 pub(in crate::cli) mod progress;
+pub(in crate::cli) mod remaining;
 pub(in crate::cli) mod shallow;
 #[cfg(feature = "vdb")]
 pub(in crate::cli) mod snow;
@@ -9,13 +10,16 @@ pub(in crate::cli) mod surface;
 
 use std::path::PathBuf;
 use std::sync::Mutex;
+use std::time::{Duration, Instant};
 
+use frazil::Error;
 use frazil::scene::run::{Pipeline, Report, Run};
 use frazil::scene::{FrameChoice, Override, Scene};
 
 use super::output;
 use super::session::{Failure, OrFailure, Session};
-use progress::FrameProgress;
+use progress::{FrameProgress, ProgressFormat};
+use remaining::Remaining;
 
 /// The output of a shot, and the part of it to make.
 #[derive(clap::Args)]
@@ -32,7 +36,23 @@ pub struct ShotArgs {
     /// Override a setting of the scene, for instance snow.noise.seed=2 or object.1.file=hero.glb.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<Override>,
+    /// Wait up to this long (s) for another run to leave the folder, instead of ending with 75 at once.
+    #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = waiting_time)]
+    pub wait: Duration,
+    /// How progress is shown on stderr: for people, or for programs as a line of JSON for each frame.
+    #[arg(long, value_name = "HOW", default_value = "text", value_enum)]
+    pub progress: ProgressFormat,
 }
+
+/// A time that `--wait` accepts: up to a year.
+fn waiting_time(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text.parse().map_err(|_| "it must be a number of seconds")?;
+    let is_valid = (0.0..=3.2e7).contains(&seconds);
+    if is_valid { Ok(Duration::from_secs_f64(seconds)) } else { Err("it must lie in 0 to 3.2e7 s".into()) }
+}
+
+/// Time between two looks at whether another run has left the folder.
+const LOOK_AGAIN: Duration = Duration::from_millis(200);
 
 impl ShotArgs {
     /// The requested frames.
@@ -61,12 +81,14 @@ impl ShotArgs {
         frames: &FrameChoice,
         on_report: impl FnMut(&Report) + Send,
     ) -> Result<(), Failure> {
-        let run =
-            Run::prepare(&session.ctx, pipeline, &self.output, stages, frames, self.from).or_refuse()?;
+        let run = self.prepare(session, pipeline, stages, frames)?;
         output::check_folder(&self.output).or_refuse()?;
-        let (to_make, existing) = (run.to_make(), run.existing());
-        let display =
-            Mutex::new((FrameProgress::new(&session.ctx, to_make, existing, session.is_quiet()), on_report));
+        let existing = run.existing();
+        let remaining = Remaining::of(&run.to_make(), Instant::now());
+        let to_make = remaining.total();
+        let format = self.progress.unless(session.is_quiet());
+        let display = FrameProgress::new(&session.ctx, remaining, existing, format);
+        let display = Mutex::new((display, on_report));
         run.make(&session.ctx, |stage, frame, report| {
             let mut display = display.lock().expect("no panic holds this lock");
             (display.1)(report);
@@ -76,5 +98,28 @@ impl ShotArgs {
         session.record("frames", to_make.into());
         session.record("frames_there", existing.into());
         Ok(())
+    }
+
+    /// Prepares the run, if need be once another run has left the folder.
+    fn prepare<'a>(
+        &self,
+        session: &Session,
+        pipeline: &'a Pipeline<'a>,
+        stages: &[String],
+        frames: &FrameChoice,
+    ) -> Result<Run<'a>, Failure> {
+        let (start, mut has_said) = (Instant::now(), false);
+        loop {
+            match Run::prepare(&session.ctx, pipeline, &self.output, stages, frames, self.from) {
+                Err(Error::Busy(_)) if start.elapsed() < self.wait => {
+                    if !std::mem::replace(&mut has_said, true) {
+                        log::info!("{}: waiting for another run to end", self.output.display());
+                    }
+                    session.ctx.check().or_fail()?;
+                    std::thread::sleep(LOOK_AGAIN);
+                }
+                prepared => return prepared.or_refuse(),
+            }
+        }
     }
 }

@@ -12,8 +12,10 @@ pub enum Look {
     Fog,
     /// Objects that move through the snow. A `UsdPreviewSurface`.
     Object,
-    /// What a liquid flows over, in the colours of `displayColor` where stains leave them. A `UsdPreviewSurface`.
+    /// What a liquid flows over. A `UsdPreviewSurface`.
     Terrain,
+    /// The same with stains, in the colours of `displayColor`: Blender draws a mesh without that primvar black.
+    StainedTerrain,
     /// Liquids with a surface, with the opacity of `displayOpacity`. Each is a `UsdPreviewSurface`.
     Water,
     /// See [`Look::Water`].
@@ -37,6 +39,7 @@ impl Look {
             Self::Fog => "fog",
             Self::Object => "object",
             Self::Terrain => "terrain",
+            Self::StainedTerrain => "stained_terrain",
             Self::Water => "water",
             Self::Blood => "blood",
             Self::Paint => "paint",
@@ -64,7 +67,7 @@ impl Look {
         let roughness = match self {
             Self::Snow => 0.75,
             Self::Object => 0.5,
-            Self::Terrain => 0.8,
+            Self::Terrain | Self::StainedTerrain => 0.8,
             Self::Paint => 0.3,
             Self::Water | Self::Blood | Self::Honey => WET,
             Self::Fog => {
@@ -78,7 +81,7 @@ impl Look {
         );
         let mut surface = shader("surface", "UsdPreviewSurface");
         let colour = Attribute::new("color3f", "inputs:diffuseColor").with(Value::Vector(self.colour()));
-        surface.add(if self == Self::Terrain {
+        surface.add(if self == Self::StainedTerrain {
             Attribute { value: None, ..colour.connected(format!("{path}/colour.outputs:result")) }
         } else {
             colour
@@ -93,7 +96,7 @@ impl Look {
         if self.is_liquid() {
             material.children.push(reader("opacity", "float", Value::Float(1.0), "displayOpacity"));
         }
-        if self == Self::Terrain {
+        if self == Self::StainedTerrain {
             material.children.push(reader("colour", "float3", Value::Vector(self.colour()), "displayColor"));
         }
         material
@@ -105,7 +108,7 @@ impl Look {
         match self {
             Self::Snow => [0.9, 0.92, 0.95],
             Self::Object => [0.32, 0.33, 0.36],
-            Self::Terrain => [0.5, 0.47, 0.43],
+            Self::Terrain | Self::StainedTerrain => [0.5, 0.47, 0.43],
             Self::Water => [0.05, 0.25, 0.3],
             Self::Blood => [0.3, 0.008, 0.006],
             Self::Paint => [0.05, 0.2, 0.6],

@@ -202,9 +202,9 @@ impl<'a> Run<'a> {
         busy.any(|other| run.stage.upstream().contains(&other.stage.name()))
     }
 
-    /// Number of frames to be made, over all stages.
-    pub fn to_make(&self) -> usize {
-        self.stages.iter().map(|run| run.todo.len()).sum()
+    /// The stages with their numbers of frames to be made.
+    pub fn to_make(&self) -> Vec<(&'static str, usize)> {
+        self.stages.iter().map(|run| (run.stage.name(), run.todo.len())).collect()
     }
 
     /// Number of wanted frames that exist, over all stages.

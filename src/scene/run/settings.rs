@@ -18,10 +18,24 @@ pub const CONTENT: &str = "content ";
 /// Settings by key: `snow.noise.size`, `object[1].scale`.
 pub type Settings = BTreeMap<String, String>;
 
+/// Keys whose defaults have changed: what a folder that was made before has, and what the same scene says now. Such a folder is resumed:
+/// its frames stay as they are, and new ones are written in the new way.
+const NEW_DEFAULTS: [(&str, Option<&str>, &str); 3] = [
+    ("output.surface", Some(r#"["ply"]"#), r#"["usd"]"#),
+    ("output.liquid", Some(r#"["ply"]"#), r#"["usd"]"#),
+    ("output.terrain", None, r#"["usd"]"#),
+];
+
 /// The keys whose values differ, each with the former value.
 pub(in crate::scene) fn changed(before: &Settings, after: &Settings) -> Vec<String> {
     let keys: BTreeSet<&String> = before.keys().chain(after.keys()).collect();
-    let differs = |key: &&&String| before.get(**key) != after.get(**key);
+    let differs = |key: &&&String| {
+        let (was, is) = (before.get(**key).map(String::as_str), after.get(**key).map(String::as_str));
+        let is_new_default = |(name, former, now): &(&str, Option<&str>, &str)| {
+            *name == **key && *former == was && Some(*now) == is
+        };
+        was != is && !NEW_DEFAULTS.iter().any(is_new_default)
+    };
     let described = |key: &String| match (before.get(key), override_key(key)) {
         (Some(value), key) if value.starts_with(CONTENT) => format!("{key} had different contents"),
         (Some(value), key) if key == "shot.frames" => format!("{key} began at {value}"),
@@ -107,6 +121,12 @@ mod tests {
         assert_eq!(changed(&before, &before), Vec::<String>::new());
         let after = settings(&[("snow.depth", "0.2"), ("snow.cell", "0.1")]);
         assert_eq!(changed(&before, &after), ["object.2.up was \"z\"", "snow.depth was 0.3"]);
+        let (before, after) = (
+            settings(&[("output.liquid", r#"["ply"]"#)]),
+            settings(&[("output.liquid", r#"["usd"]"#), ("output.terrain", r#"["usd"]"#)]),
+        );
+        assert_eq!(changed(&before, &after), Vec::<String>::new());
+        assert_eq!(changed(&after, &before).len(), 2);
         let file =
             |content: &str| BTreeMap::from([("object[1].file".to_string(), format!("{CONTENT}{content}"))]);
         assert_eq!(changed(&file("a"), &file("b")), ["object.1.file had different contents"]);

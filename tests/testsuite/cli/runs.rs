@@ -45,6 +45,28 @@ fn a_scene_makes_frames_and_its_resolved_file_makes_them_again() {
 }
 
 #[test]
+fn progress_is_a_line_of_json_for_each_frame() {
+    let folder = folder(3, 0.05, CUBE);
+    let said = works(&folder, "snow shot.toml -o out --progress json --set output.objects=[\"usd\"]");
+    let lines: Vec<serde_json::Value> =
+        said.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    assert_eq!(lines.len(), 6, "{said}");
+    let of_base: Vec<i64> = lines
+        .iter()
+        .filter(|line| line["stage"] == "base")
+        .map(|line| line["frame"].as_i64().unwrap())
+        .collect();
+    assert_eq!(of_base, [1, 2, 3]);
+    for line in &lines {
+        let [fraction, left] = ["fraction", "seconds_left"].map(|key| line[key].as_f64().unwrap());
+        assert!((0.0..=1.0).contains(&fraction) && left >= 0.0, "{line}");
+    }
+    let last = lines.last().unwrap();
+    assert_eq!((last["fraction"].as_f64(), last["seconds_left"].as_f64()), (Some(1.0), Some(0.0)));
+    assert_eq!(works(&folder, "snow shot.toml -o quiet -q --progress json"), "");
+}
+
+#[test]
 fn another_scene_does_not_mix_into_a_folder() {
     let folder = folder(2, 0.05, CUBE);
     works(&folder, "snow shot.toml -o out -q");

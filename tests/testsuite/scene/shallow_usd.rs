@@ -120,6 +120,7 @@ fn a_terrain_that_moves_or_is_stained_has_a_file_for_each_frame() {
     assert_eq!(ply.of_vertices("red").unwrap()[0], 188.0);
     let text = stage(&folder.join("stained"));
     assert!(text.contains("color3f[] primvars:displayColor"), "{text}");
+    assert!(text.contains("</shot/materials/stained_terrain>"), "{text}");
 }
 
 #[test]

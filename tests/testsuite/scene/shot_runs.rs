@@ -234,10 +234,15 @@ fn two_runs_do_not_write_into_one_folder() {
         std::thread::sleep(Duration::from_millis(2));
     }
     fails(&folder, "snow shot.toml -o out", 75, &["another run", "out"]);
+    fails(&folder, "snow shot.toml -o out --wait 0.3", 75, &["another run", "out"]);
+    // One that waits gets its turn; a dead run holds nothing.
+    let mut waiting = command(&folder, "snow shot.toml -o out -q --frames 1-2 --wait 600").spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    assert!(waiting.try_wait().unwrap().is_none());
     child.kill().unwrap();
     child.wait().unwrap();
-    // A dead run holds nothing.
-    works(&folder, "snow shot.toml -o out -q --frames 1-2");
+    assert!(waiting.wait().unwrap().success());
+    fails(&folder, "snow shot.toml -o out --wait=-1", 2, &["--wait", "3.2e7"]);
 }
 
 #[test]

@@ -58,8 +58,9 @@ fn stain_arrays(stains: &[f32], look: Look, coloured: fn(&[[f32; 3]]) -> [MeshAr
 pub(super) fn terrain_prims<'a>(is_stained: bool, look: Look) -> Vec<MeshPrim<'a>> {
     let arrays = if is_stained { stain_arrays(&[], look, linear) } else { Vec::new() };
     let primvars = primvars::primvars(&arrays.iter().collect::<Vec<&MeshArray>>());
-    let shading = Shading::Creased;
-    vec![MeshPrim { name: TERRAIN.into(), look: Look::Terrain, moves: false, uvs: None, primvars, shading }]
+    let (name, shading) = (TERRAIN.into(), Shading::Creased);
+    let look = if is_stained { Look::StainedTerrain } else { Look::Terrain };
+    vec![MeshPrim { name, look, moves: false, uvs: None, primvars, shading }]
 }
 
 /// The prims of obstacles with keys in the shot.
