@@ -23,14 +23,24 @@ pub struct ShallowFolder {
     scene: Option<Scene>,
     /// The terrain, if it is the same in all frames and was read.
     terrain: Option<TriMesh>,
-    /// The extension of the files that are drawn.
-    extension: &'static str,
     /// The existing frames, ascending; at least one.
     frames: Vec<i32>,
 }
 
 /// The extensions of files that can be drawn, the best first.
 const DRAWN: [&str; 2] = ["ply", "usdc"];
+
+/// The files of a kind that can be drawn: their frames and extensions.
+fn drawn(stored: &DoneFrames, kind: &str) -> Vec<(i32, &'static str)> {
+    let known = |path: &str| DRAWN.into_iter().find(|known| *known == extension(path.as_ref()));
+    stored.files(kind).into_iter().filter_map(|(frame, path)| Some((frame, known(&path)?))).collect()
+}
+
+/// The extension of the file of a kind to draw at a frame.
+fn drawn_at(stored: &DoneFrames, kind: &str, frame: i32) -> Option<&'static str> {
+    let all = drawn(stored, kind);
+    DRAWN.into_iter().find(|known| all.contains(&(frame, known)))
+}
 
 impl ShallowFolder {
     /// Opens a folder; none if it has no frames of a liquid.
@@ -39,15 +49,12 @@ impl ShallowFolder {
     /// Records that cannot be read.
     pub fn open(folder: &Path) -> Result<Option<Self>> {
         let liquid = DoneFrames::read(folder, LIQUID)?;
-        let all = liquid.files(LIQUID);
-        let frames_of = |kind: &'static str| {
-            let files = all.iter().filter(|(_, path)| extension(path.as_ref()) == kind);
-            let frames: Vec<i32> = files.map(|(frame, _)| *frame).collect();
-            (!frames.is_empty()).then_some((kind, frames))
-        };
-        // A folder whose kind of files was changed has frames of both: the kind with the most is drawn.
-        let drawn = DRAWN.into_iter().rev().filter_map(frames_of).max_by_key(|(_, frames)| frames.len());
-        let Some((extension, frames)) = drawn else { return Ok(None) };
+        let mut frames: Vec<i32> = drawn(&liquid, LIQUID).into_iter().map(|(frame, _)| frame).collect();
+        frames.sort_unstable();
+        frames.dedup();
+        if frames.is_empty() {
+            return Ok(None);
+        }
         let scene = match Scene::read(&folder.join("scene.toml")) {
             Ok(scene) => Some(scene),
             Err(error) => {
@@ -55,7 +62,7 @@ impl ShallowFolder {
                 None
             }
         };
-        Ok(Some(Self { folder: folder.to_path_buf(), liquid, scene, terrain: None, extension, frames }))
+        Ok(Some(Self { folder: folder.to_path_buf(), liquid, scene, terrain: None, frames }))
     }
 
     /// The terrain, and the objects on it; a warning if they cannot be read.
@@ -108,20 +115,14 @@ impl Folder for ShallowFolder {
         let look = self.scene.as_ref().and_then(|scene| scene.shallow().ok());
         let look = LiquidLook::of(look.map_or("", |liquid| &*liquid.look));
         let mut parts = self.around(ctx, frame, look);
-        let of_terrain: Vec<String> = self
-            .liquid
-            .files(TERRAIN)
-            .into_iter()
-            .filter(|(at, _)| *at == frame)
-            .map(|(_, path)| extension(path.as_ref()))
-            .collect();
-        if let Some(kind) = DRAWN.into_iter().find(|kind| of_terrain.iter().any(|other| other == kind)) {
+        if let Some(kind) = drawn_at(&self.liquid, TERRAIN, frame) {
             let stained = mesh::read_detailed(&self.liquid.file_with(frame, TERRAIN, kind)?)?;
             let stains = stained.of_vertices("stain").unwrap_or_default();
             parts.retain(|part| !matches!(part, Part::Ground(..)));
             parts.push(Part::Ground(stained.mesh, stains, look));
         }
-        let path = self.liquid.file_with(frame, LIQUID, self.extension)?;
+        let kind = drawn_at(&self.liquid, LIQUID, frame).unwrap_or(DRAWN[0]);
+        let path = self.liquid.file_with(frame, LIQUID, kind)?;
         // A file without faces is not a mesh.
         let report = self.liquid.report(frame)?;
         let is_dry = report.is_some_and(|report| report["triangles"].as_u64() == Some(0));

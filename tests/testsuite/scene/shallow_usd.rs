@@ -136,3 +136,19 @@ fn an_opacity_in_ply_has_a_colour_beside_it() {
     }
     assert_eq!(ply.of_vertices("alpha"), read(folder, "out/liquid/liquid.0001.usdc").of_vertices("alpha"));
 }
+
+#[test]
+fn a_folder_with_the_files_of_former_defaults_is_resumed_and_drawn() {
+    let folder = &Folder::empty();
+    write_shot(folder, "floor.ply", "");
+    works(folder, "shallow spill.toml -o out -q --frames 1 --set output.liquid=[\"ply\"]");
+    works(folder, "shallow spill.toml -o out -q");
+    let is_there = |name: &str| folder.join("out/liquid").join(name).is_file();
+    assert!(is_there("liquid.0001.ply") && !is_there("liquid.0001.usdc") && is_there("liquid.0003.usdc"));
+    for frame in [1, 3] {
+        works(folder, &format!("preview out --frame {frame} -o p.png --size 32x24"));
+    }
+    works(folder, "shallow spill.toml -o fresh -q");
+    let last = |out: &str| fs::read(folder.join(out).join("liquid/liquid.0003.usdc")).unwrap();
+    assert!(last("out") == last("fresh"));
+}
