@@ -12,7 +12,7 @@ def stage_in(name, metres, axis):
     stage = Usd.Stage.CreateNew(str(FOLDER / name))
     UsdGeom.SetStageMetersPerUnit(stage, metres)
     UsdGeom.SetStageUpAxis(stage, axis)
-    UsdGeom.Xform.Define(stage, "/root")
+    UsdGeom.Xform.Define(stage, "/scene")
     return stage
 
 
@@ -27,7 +27,7 @@ def mesh():
     from pxr.Sdf import ValueTypeNames as Types
 
     stage = stage_in("mesh.usdc", 0.01, UsdGeom.Tokens.z)
-    mesh = UsdGeom.Mesh.Define(stage, "/root/quad")
+    mesh = UsdGeom.Mesh.Define(stage, "/scene/quad")
     mesh.CreateOrientationAttr(UsdGeom.Tokens.leftHanded)
     points = [(0, 0, 0), (100, 0, 0), (100, 100, 0), (0, 100, 0), (0, 0, 200)]
     mesh.CreatePointsAttr().Set(Vt.Vec3fArray(points), 3)
@@ -44,7 +44,7 @@ def points():
     from pxr.Sdf import ValueTypeNames as Types
 
     stage = stage_in("points.usdc", 1.0, UsdGeom.Tokens.y)
-    points = UsdGeom.Points.Define(stage, "/root/drop")
+    points = UsdGeom.Points.Define(stage, "/scene/drop")
     points.CreatePointsAttr([(n, 0.5, 0) for n in range(100)])
     points.CreateWidthsAttr([0.1])
     points.SetWidthsInterpolation(UsdGeom.Tokens.constant)
@@ -55,7 +55,7 @@ def points():
 
 def moved():
     stage = stage_in("moved.usdc", 1.0, UsdGeom.Tokens.y)
-    mesh = UsdGeom.Mesh.Define(stage, "/root/moved")
+    mesh = UsdGeom.Mesh.Define(stage, "/scene/moved")
     mesh.CreatePointsAttr([(0, 0, 0), (1, 0, 0), (0, 1, 0)])
     mesh.CreateFaceVertexCountsAttr([3])
     mesh.CreateFaceVertexIndicesAttr([0, 1, 2])

@@ -1,5 +1,5 @@
-//! Points of binary USD files: those of all prims of the type Points. `velocities` become v, `ids` id, and `widths` pscale (half of them);
-//! primvars keep their names.
+//! Points of binary USD files: those of the one prim of the type Points. `velocities` become v, `ids` id, and `widths` pscale, which is half
+//! of a width; primvars keep their names.
 
 use super::ParticleColumns;
 use crate::geometry::DVec3;

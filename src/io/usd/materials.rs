@@ -12,7 +12,7 @@ pub enum Look {
     Fog,
     /// Objects that move through the snow. A `UsdPreviewSurface`.
     Object,
-    /// What a liquid flows over. A `UsdPreviewSurface`.
+    /// The terrain under a liquid. A `UsdPreviewSurface`.
     Terrain,
     /// The same with stains, in the colours of `displayColor`: Blender draws a mesh without that primvar black.
     StainedTerrain,

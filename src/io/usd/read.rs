@@ -35,7 +35,7 @@ impl<'a> UsdFile<'a> {
     /// The prims of a type.
     ///
     /// # Errors
-    /// None; one that is moved by a transform, of its own or of a prim above it, as transforms are not read.
+    /// There is no such prim; one is moved by a transform, of its own or of a prim above it, as transforms are not read.
     pub fn prims(&self, class: &str, what: &str) -> Parsed<Vec<&ReadPrim>> {
         let prims: Vec<&ReadPrim> = self.data.prims().iter().filter(|prim| prim.class == class).collect();
         fail_if(prims.is_empty(), || format!("it has no {what}"))?;

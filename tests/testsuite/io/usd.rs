@@ -279,5 +279,5 @@ fn files_of_openusd_are_read() {
         found.attribute("whole"),
         Some(&Values::Float(Column::Each((0..100).map(|n| n as f32).collect())))
     );
-    fails(&folder, "info moved.usdc", 2, &["moved.usdc", "/root/moved", "transform"]);
+    fails(&folder, "info moved.usdc", 2, &["moved.usdc", "/scene/moved", "transform"]);
 }
