@@ -4,6 +4,7 @@ mod check;
 mod convert;
 mod frame_results;
 mod info;
+mod jobs;
 mod mesh;
 mod new;
 mod options;
@@ -39,6 +40,7 @@ struct Cli {
 enum Command {
     New(new::Args),
     Check(check::Args),
+    Jobs(jobs::Args),
     #[cfg(feature = "vdb")]
     Snow(shot::snow::Args),
     #[cfg(feature = "vdb")]
@@ -57,6 +59,7 @@ impl Command {
         match self {
             Self::New(args) => new::run(&args),
             Self::Check(args) => check::run(&args, session),
+            Self::Jobs(args) => jobs::run(&args, session),
             #[cfg(feature = "vdb")]
             Self::Snow(args) => shot::snow::run(&args, session),
             #[cfg(feature = "vdb")]

@@ -118,8 +118,22 @@ pub fn moments(count: usize) -> Vec<f64> {
 pub fn output(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut out = BTreeMap::new();
     for name in [
-        "", "base", "removed", "grains", "mist", "fog", "snow", "mesh", "objects", "tally", "surface",
-        "liquid", "volume", "state",
+        "",
+        "base",
+        "removed",
+        "grains",
+        "mist",
+        "fog",
+        "snow",
+        "mesh",
+        "objects",
+        "tally",
+        "surface",
+        "liquid",
+        "volume",
+        "terrain",
+        "obstacles",
+        "state",
     ] {
         let Ok(entries) = std::fs::read_dir(folder.join(name)) else { continue };
         for path in entries.map(|entry| entry.unwrap().path()).filter(|path| path.is_file()) {

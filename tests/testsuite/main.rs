@@ -76,6 +76,7 @@ mod scene {
     mod clients;
     mod demo_jelly;
     mod demo_walk;
+    mod farm;
     mod fuzz;
     mod shallow_carried;
     mod shallow_follows;

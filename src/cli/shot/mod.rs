@@ -36,6 +36,16 @@ pub struct ShotArgs {
     /// Override a setting of the scene, for instance snow.noise.seed=2 or object.1.file=hero.glb.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<Override>,
+    /// Only prepare the folder: write the scene, and record which frames will be made.
+    #[arg(long, conflicts_with_all = ["chunk", "finish"])]
+    pub prepare: bool,
+    /// Make --frames of one --stage as one of many processes at once, in a folder that --prepare has prepared; for stages whose frames
+    /// depend on no other.
+    #[arg(long, requires = "frames", conflicts_with_all = ["from", "finish"])]
+    pub chunk: bool,
+    /// Only finish the shot: all frames must be there; writes shot.usda.
+    #[arg(long, conflicts_with = "from")]
+    pub finish: bool,
     /// Wait up to this long (s) for another run to leave the folder, instead of ending with 75 at once.
     #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = waiting_time)]
     pub wait: Duration,
@@ -86,6 +96,21 @@ impl ShotArgs {
         let existing = run.existing();
         let remaining = Remaining::of(&run.to_make(), Instant::now());
         let to_make = remaining.total();
+        session.record("frames", to_make.into());
+        session.record("frames_there", existing.into());
+        if self.prepare {
+            return Ok(());
+        }
+        if self.finish && to_make > 0 {
+            let counts: Vec<String> = run
+                .to_make()
+                .iter()
+                .filter(|(_, count)| *count > 0)
+                .map(|(stage, count)| format!("{count} of stage {stage}"))
+                .collect();
+            let what = format!("{}: frames are missing: {}", self.output.display(), counts.join(", "));
+            return Err(Failure::failed(what));
+        }
         let format = self.progress.unless(session.is_quiet());
         let display = FrameProgress::new(&session.ctx, remaining, existing, format);
         let display = Mutex::new((display, on_report));
@@ -94,10 +119,7 @@ impl ShotArgs {
             (display.1)(report);
             display.0.finished(stage, frame);
         })
-        .or_fail()?;
-        session.record("frames", to_make.into());
-        session.record("frames_there", existing.into());
-        Ok(())
+        .or_fail()
     }
 
     /// Prepares the run, if need be once another run has left the folder.
@@ -110,7 +132,12 @@ impl ShotArgs {
     ) -> Result<Run<'a>, Failure> {
         let (start, mut has_said) = (Instant::now(), false);
         loop {
-            match Run::prepare(&session.ctx, pipeline, &self.output, stages, frames, self.from) {
+            let prepared = match (self.chunk, stages) {
+                (true, [stage]) => Run::chunk(&session.ctx, pipeline, &self.output, stage, frames),
+                (true, _) => return Err(Failure::refused("--chunk makes one stage: name it with --stage")),
+                (false, _) => Run::prepare(&session.ctx, pipeline, &self.output, stages, frames, self.from),
+            };
+            match prepared {
                 Err(Error::Busy(_)) if start.elapsed() < self.wait => {
                     if !std::mem::replace(&mut has_said, true) {
                         log::info!("{}: waiting for another run to end", self.output.display());

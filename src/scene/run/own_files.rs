@@ -151,6 +151,24 @@ impl OwnFiles {
         folders.any(|kind| self.is_own(&kind, &name) && is_same(folder, &self.folder.join(kind)))
     }
 
+    /// Fails unless a run has recorded that it will write these frames of a stage.
+    ///
+    /// # Errors
+    /// The first frame that no run has begun.
+    pub fn refuse_unprepared(&self, stage: &str, frames: &FrameChoice) -> Result<()> {
+        let started = self.written.as_ref().and_then(|written| written.stages.get(stage));
+        let is_new = |frame: &i32| !started.is_some_and(|started| started.has_started(*frame));
+        match frames.iter().find(is_new) {
+            None => Ok(()),
+            Some(frame) => {
+                let what = format!(
+                    "was not prepared for frame {frame} of stage {stage}: run the same command with --prepare first"
+                );
+                Err(Error::file(&self.folder, what))
+            }
+        }
+    }
+
     /// Records that frames of a stage will be written.
     ///
     /// # Errors
@@ -221,7 +239,7 @@ impl OwnFiles {
     /// Whether runs write files of this name into a folder.
     fn is_own(&self, folder: &str, name: &str) -> bool {
         let is_shot_file = match folder {
-            "" => [SCENE, SHOT_USD, usd::SAMPLES].contains(&name),
+            "" => [SCENE, SHOT_USD, usd::SAMPLES].contains(&name) || self.known.files.contains_key(name),
             "state" => name == FILES || name.strip_suffix(".json").is_some_and(|name| self.has_stage(name)),
             kind => self.known.files.contains_key(&format!("{kind}/{name}")),
         };

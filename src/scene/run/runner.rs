@@ -24,8 +24,19 @@ pub struct Run<'a> {
     /// All stages, including those that are not to be made.
     stages: Vec<StageRun<'a>>,
     own: OwnFiles,
+    /// Whether it makes a chunk, and so writes nothing but frames.
+    is_chunk: bool,
     /// Held until the run is dropped.
     _lock: File,
+}
+
+/// Who may write into a folder beside a run.
+#[derive(Clone, Copy)]
+enum Access {
+    /// Nobody.
+    Alone,
+    /// Other runs that make chunks.
+    Shared,
 }
 
 /// A stage in a run.
@@ -71,12 +82,12 @@ impl<'a> Run<'a> {
         OwnFiles::read(folder, of_run())?.refuse_foreign(pipeline, frames)?;
         pipeline.refuse_stale(&chosen, folder)?;
         make_folders(of_run(), folder)?;
-        let lock = lock(folder)?;
+        let lock = lock(folder, Access::Alone)?;
         let own = OwnFiles::read(folder, of_run())?;
         own.remove_unfinished()?;
         own.refuse_foreign(pipeline, frames)?;
         pipeline.refuse_stale(&chosen, folder)?;
-        let mut run = Self { pipeline, stages: Vec::new(), own, _lock: lock };
+        let mut run = Self { pipeline, stages: Vec::new(), own, is_chunk: false, _lock: lock };
         let downstream = if from.is_some() { pipeline.downstream(&chosen) } else { Vec::new() };
         for (position, stage) in pipeline.stages.iter().enumerate() {
             let is_chosen = chosen.contains(&position);
@@ -87,6 +98,42 @@ impl<'a> Run<'a> {
         run.load(ctx)?;
         // Validation is complete: commit.
         run.commit()?;
+        Ok(run)
+    }
+
+    /// A run that makes some frames of a stage whose frames do not depend on one another, and writes nothing else, so that many may be at
+    /// work at once. A run has prepared the folder for these frames before ([`Run::prepare`] is enough).
+    ///
+    /// # Errors
+    /// As [`Run::prepare`]; a stage whose frames depend on one another; a folder that was not prepared, or for other frames.
+    pub fn chunk(
+        ctx: &Context,
+        pipeline: &'a Pipeline<'a>,
+        folder: &Path,
+        stage: &str,
+        frames: &FrameChoice,
+    ) -> Result<Self> {
+        let chosen = pipeline.chosen(&[stage.to_string()])?;
+        let [position] = chosen[..] else {
+            return Err(Error::Internal("a name is that of one stage".into()));
+        };
+        let own_stage: &dyn Stage = &*pipeline.stages[position];
+        if own_stage.has_memory() {
+            let what = format!(
+                "stage {stage} cannot be made in chunks: each of its frames continues the one before"
+            );
+            return Err(Error::argument(what));
+        }
+        let own = OwnFiles::read(folder, std::iter::once(own_stage))?;
+        own.refuse_unprepared(stage, frames)?;
+        let lock = lock(folder, Access::Shared)?;
+        let mut run = Self { pipeline, stages: Vec::new(), own, is_chunk: true, _lock: lock };
+        let request = Request { first: pipeline.scene.shot.frames.first, frames, from: None };
+        for (other, stage) in pipeline.stages.iter().enumerate() {
+            let of_stage = run.open(&**stage, folder, request, other == position, None)?;
+            run.stages.push(of_stage);
+        }
+        run.load(ctx)?;
         Ok(run)
     }
 
@@ -235,6 +282,9 @@ impl<'a> Run<'a> {
         if let Some(error) = first_error {
             return Err(error);
         }
+        if self.is_chunk {
+            return Ok(());
+        }
         if self.pipeline.scene.output.usd {
             let folder = self.own.folder().to_path_buf();
             let stored: Vec<DoneFrames> = self
@@ -342,12 +392,16 @@ fn make_folders<'s>(stages: impl Iterator<Item = &'s dyn Stage>, folder: &Path) 
     Ok(())
 }
 
-/// Prevents other runs from writing into a folder.
-fn lock(folder: &Path) -> Result<File> {
+/// Prevents other runs from writing into a folder, except those that the access allows.
+fn lock(folder: &Path, access: Access) -> Result<File> {
     let path = folder.join("state").join("run.lock");
     let file = File::options().create(true).append(true).open(&path);
     let file = file.map_err(|error| Error::io(&path, "write", error))?;
-    match file.try_lock() {
+    let locked = match access {
+        Access::Alone => file.try_lock(),
+        Access::Shared => file.try_lock_shared(),
+    };
+    match locked {
         Err(std::fs::TryLockError::WouldBlock) => Err(Error::Busy(folder.to_path_buf())),
         // File systems without locks are allowed.
         Err(std::fs::TryLockError::Error(error)) => {

@@ -15,6 +15,12 @@ pub struct Override {
     text: String,
 }
 
+impl std::fmt::Display for Override {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.write_str(&self.text)
+    }
+}
+
 impl std::str::FromStr for Override {
     type Err = String;
 

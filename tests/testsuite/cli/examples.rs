@@ -141,12 +141,16 @@ fn the_page_of_the_command_line_runs() {
         works(&folder, &line.replace("cache/", "changes/"));
         count += 1;
     }
+    for line in lines(block(CLI, "## Farms", "sh")) {
+        works(&folder, line);
+        count += 1;
+    }
     for line in lines(block(CLI, "## Pictures", "sh")) {
         // A few frames show as much as all.
         works(&folder, &line.replace(" -o shot.gif", " --frames 1-120x40 -o shot.gif"));
         count += 1;
     }
-    assert_eq!(count, 15);
+    assert_eq!(count, 18);
 }
 
 /// Two frames of points.
