@@ -12,7 +12,7 @@ BUILD := cargo build --release -p frazil -p make_scenes --lib --bin frazil --bin
 # so this one is copied to another folder; `$(BUILD)` puts the whole one back.
 CORE := cargo build --release -p frazil --no-default-features --lib && mkdir -p target/core && cp target/release/libfrazil.a target/core/
 
-.PHONY: setup setup-build setup-core demo test test-hosts test-core test-clients test-dist sanitize fuzz deny msrv site skinning-numbers pictures lint gates bench header install install-core hosts hosts-core dist
+.PHONY: setup setup-build setup-core demo test test-hosts test-core test-clients test-farm test-dist sanitize fuzz deny msrv site skinning-numbers pictures lint gates bench header install install-core hosts hosts-core dist
 
 # Everything that building and testing need, from Debian's packages; quick when it is there.
 setup:
@@ -143,6 +143,11 @@ test-dist: dist hosts
 test-clients: setup
 	@./tools/clients
 	cargo test --release --test testsuite -- --nocapture scene::clients:: motion::gltf::
+
+# OpenJD and Slurm make a shot as one process does; as root, installs them (apt-get, and PyPI into target/farm).
+test-farm: setup
+	cargo build --release --bins
+	@./tools/farm
 
 # Blender's poses of CesiumMan, which tests/testsuite/motion/gltf.rs and a gate compare with.
 skinning-numbers:

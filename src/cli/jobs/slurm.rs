@@ -1,6 +1,7 @@
 //! A script that submits a shot to Slurm: a job for each task, and an array for its chunks.
 
 use super::{Task, quoted};
+use crate::cli::session::exit::BUSY;
 
 /// The script. A job that is killed or loses its node is queued again, and resumes.
 pub(super) fn script(name: &str, tasks: &[Task]) -> String {
@@ -14,17 +15,15 @@ pub(super) fn script(name: &str, tasks: &[Task]) -> String {
             true => String::new(),
             false => format!(" --dependency=afterok:{}", after.join(":")),
         };
-        let words: Vec<String> = task.command.iter().map(|word| quoted(word)).collect();
+        let command = task.command.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ");
         let (array, command) = match task.chunks.is_empty() {
-            true => (String::new(), words.join(" ")),
+            true => (String::new(), retried(&command)),
             false => {
                 let chunks: Vec<String> =
                     task.chunks.iter().map(|[first, last]| format!("{first}-{last}")).collect();
-                let command = format!(
-                    "set -- {}; shift \"$SLURM_ARRAY_TASK_ID\"; exec {} \"$1\"",
-                    chunks.join(" "),
-                    words.join(" ")
-                );
+                let retried = retried(&format!("{command} \"$1\""));
+                let command =
+                    format!("set -- {}; shift \"$SLURM_ARRAY_TASK_ID\"; {retried}", chunks.join(" "));
                 (format!(" --array=0-{}", task.chunks.len() - 1), command)
             }
         };
@@ -37,6 +36,11 @@ pub(super) fn script(name: &str, tasks: &[Task]) -> String {
     }
     let last = tasks.last().map_or(String::new(), |task| variable(&task.name));
     out + &format!("echo \"${last}\"\n")
+}
+
+/// A command that starts again for as long as another run keeps it from its folder.
+fn retried(command: &str) -> String {
+    format!("until {command}; do code=$?; [ $code -eq {BUSY} ] || exit $code; done")
 }
 
 /// The shell's variable with the number of a job.

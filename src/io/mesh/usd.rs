@@ -3,7 +3,7 @@
 //!
 //! What frazil writes is read: positions in the layer's unit and axes, polygons, `velocities` (as vx, vy, vz), `primvars:st`, and primvars
 //! with a value for each vertex, face or corner (`displayColor` as red, green and blue, `displayOpacity` as alpha, vectors as three arrays).
-//! Transforms are refused, and animation is read at the first of its times.
+//! Transforms are applied; animation is read at the first of its times.
 
 use crate::geometry::mesh::attributes::{MeshArray, Number, On};
 use crate::geometry::mesh::uvs;
@@ -105,6 +105,8 @@ impl Order {
     ) -> Parsed<Self> {
         let is_left =
             matches!(file.value(prim, "orientation")?, Some(Value::Token(side)) if side == "leftHanded");
+        // Seen from outside.
+        let is_clockwise = is_left != file.is_mirrored(prim)?;
         let mut order =
             Self { corners: Vec::new(), faces: Vec::new(), counts: [vertices, corners, counts.len()] };
         let mut first = 0usize;
@@ -116,8 +118,7 @@ impl Order {
             first = of_face.end;
             if of_face.len() >= 3 {
                 order.faces.push(face);
-                // Clockwise seen from outside.
-                if is_left { order.corners.extend(of_face.rev()) } else { order.corners.extend(of_face) }
+                if is_clockwise { order.corners.extend(of_face.rev()) } else { order.corners.extend(of_face) }
             }
         }
         if first == corners {

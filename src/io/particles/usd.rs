@@ -1,5 +1,5 @@
 //! Points of binary USD files: those of the one prim of the type Points. `velocities` become v, `ids` id, and `widths` pscale, which is half
-//! of a width; primvars keep their names.
+//! of a width, in metres; primvars keep their names. Transforms are applied.
 
 use super::ParticleColumns;
 use crate::geometry::DVec3;
@@ -51,7 +51,8 @@ fn points(file: &UsdFile<'_>, prim: &ReadPrim) -> Parsed<ParticleColumns> {
         if name == "pscale"
             && let Numbers::Floats(widths) = &mut numbers
         {
-            widths.iter_mut().for_each(|width| *width /= 2.0);
+            let half = file.scale(prim)? / 2.0;
+            widths.iter_mut().for_each(|width| *width *= half);
         }
         // One value for all.
         if attribute.interpolation == "constant" && numbers.count() == components {

@@ -10,6 +10,7 @@ pub mod primvars;
 pub(in crate::io) mod read;
 mod stage;
 mod text;
+mod transforms;
 mod volumes;
 
 pub use file::{BINARY, Contents, ContentsByName, File, Format, Units};

@@ -3,14 +3,16 @@
 use super::binary::{Crate, ReadPrim};
 use super::file::Units;
 use super::layer::Value;
+use super::transforms::{self, Transform, Transforms};
 use crate::error::fail_if;
 use crate::geometry::DVec3;
 use crate::io::files::source::Parsed;
 
-/// A file that has been opened, with its units.
+/// A file that has been opened, with its units and transforms.
 pub(in crate::io) struct UsdFile<'a> {
     data: Crate<'a>,
     units: Units,
+    transforms: Transforms,
 }
 
 impl<'a> UsdFile<'a> {
@@ -24,7 +26,8 @@ impl<'a> UsdFile<'a> {
         let metres = data.metadata_number("metersPerUnit")?.unwrap_or(0.01);
         fail_if(!(metres.is_finite() && metres > 0.0), || format!("its unit cannot be {metres} m"))?;
         let z_up = data.metadata_token("upAxis").is_some_and(|axis| axis == "Z");
-        Ok(Self { data, units: Units { metres, z_up } })
+        let transforms = transforms::of_all(&data);
+        Ok(Self { data, units: Units { metres, z_up }, transforms })
     }
 
     /// Whether it has a prim of a type.
@@ -35,23 +38,10 @@ impl<'a> UsdFile<'a> {
     /// The prims of a type.
     ///
     /// # Errors
-    /// There is no such prim; one is moved by a transform, of its own or of a prim above it, as transforms are not read.
+    /// There is no such prim.
     pub fn prims(&self, class: &str, what: &str) -> Parsed<Vec<&ReadPrim>> {
         let prims: Vec<&ReadPrim> = self.data.prims().iter().filter(|prim| prim.class == class).collect();
         fail_if(prims.is_empty(), || format!("it has no {what}"))?;
-        let moves = |prim: &&ReadPrim| {
-            prim.attribute("xformOpOrder").is_some_and(|order| self.data.holds_values(order))
-        };
-        for moved in self.data.prims().iter().filter(moves) {
-            let below = format!("{}/", moved.path);
-            let of_it = prims.iter().find(|prim| prim.path == moved.path || prim.path.starts_with(&below));
-            if let Some(prim) = of_it {
-                return Err(format!(
-                    "{} has a transform, and only positions are read: apply it to them first",
-                    prim.path
-                ));
-            }
-        }
         Ok(prims)
     }
 
@@ -63,12 +53,34 @@ impl<'a> UsdFile<'a> {
         prim.attribute(name).map_or(Ok(None), |attribute| self.data.value(attribute))
     }
 
+    /// Its transform to the layer's space.
+    fn transform(&self, prim: &ReadPrim) -> Parsed<Transform> {
+        self.transforms.get(&prim.path).cloned().unwrap_or_else(|| Err("it is not in the file".into()))
+    }
+
+    /// Whether a prim's transform exchanges left and right.
+    ///
+    /// # Errors
+    /// A transform that cannot be read.
+    pub fn is_mirrored(&self, prim: &ReadPrim) -> Parsed<bool> {
+        Ok(self.transform(prim)?.mirrors())
+    }
+
+    /// Ratio of lengths in metres to a prim's lengths.
+    ///
+    /// # Errors
+    /// A transform that cannot be read.
+    pub fn scale(&self, prim: &ReadPrim) -> Parsed<f64> {
+        Ok(self.transform(prim)?.scale() * self.units.metres)
+    }
+
     /// A prim's positions relative to `origin`, which is in the file's unit and axes, in metres with Y up.
     ///
     /// # Errors
-    /// As [`UsdFile::value`].
+    /// As [`UsdFile::value`]; a transform that cannot be read.
     pub fn positions(&self, prim: &ReadPrim, origin: DVec3) -> Parsed<Vec<DVec3>> {
-        let moved = |position: DVec3| self.in_metres(position - origin);
+        let transform = self.transform(prim)?;
+        let moved = |position: DVec3| self.in_metres(transform.point(position) - origin);
         Ok(match self.value(prim, "points")? {
             Some(Value::Vectors(all)) => all.into_iter().map(|p| moved(p.map(f64::from).into())).collect(),
             Some(Value::DoubleVectors(all)) => all.into_iter().map(|p| moved(p.into())).collect(),
@@ -79,10 +91,11 @@ impl<'a> UsdFile<'a> {
     /// A prim's velocities (m/s); none unless it has one for each of `count` points.
     ///
     /// # Errors
-    /// As [`UsdFile::value`].
+    /// As [`UsdFile::positions`].
     pub fn velocities(&self, prim: &ReadPrim, count: usize) -> Parsed<Option<Vec<DVec3>>> {
         let Some(Value::Vectors(all)) = self.value(prim, "velocities")? else { return Ok(None) };
-        let in_metres = |velocity: [f32; 3]| self.in_metres(velocity.map(f64::from).into());
+        let transform = self.transform(prim)?;
+        let in_metres = |velocity: [f32; 3]| self.in_metres(transform.vector(velocity.map(f64::from).into()));
         Ok((all.len() == count).then(|| all.into_iter().map(in_metres).collect()))
     }
 

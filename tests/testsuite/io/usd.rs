@@ -279,5 +279,11 @@ fn files_of_openusd_are_read() {
         found.attribute("whole"),
         Some(&Values::Float(Column::Each((0..100).map(|n| n as f32).collect())))
     );
-    fails(&folder, "info moved.usdc", 2, &["moved.usdc", "/scene/moved", "transform"]);
+    let [moved, baked] = ["moved.usdc", "baked.usdc"].map(|name| mesh::read(&folder.join(name)).unwrap());
+    assert_eq!(moved.triangles, baked.triangles);
+    assert_eq!(moved.positions.len(), 5 * 4);
+    let far = moved.positions.iter().zip(&baked.positions).map(|(a, b)| (a - b).norm()).fold(0.0, f32::max);
+    // In metres, and 32-bit floats hold centimetres in one of the files.
+    assert!(far < 3e-6, "{far}");
+    fails(&folder, "info half.usdc", 2, &["half.usdc", "/scene/half", "xformOp:scale"]);
 }

@@ -42,6 +42,9 @@ enum Type {
     Text = 10,
     Token = 11,
     Asset = 12,
+    Matrix4 = 15,
+    QuaternionDouble = 16,
+    QuaternionFloat = 17,
     Double2 = 19,
     Float2 = 20,
     Double3 = 23,
@@ -61,7 +64,7 @@ impl SpecType {
 }
 
 impl Type {
-    const ALL: [Self; 18] = [
+    const ALL: [Self; 21] = [
         Self::Bool,
         Self::Int,
         Self::Uint,
@@ -71,6 +74,9 @@ impl Type {
         Self::Text,
         Self::Token,
         Self::Asset,
+        Self::Matrix4,
+        Self::QuaternionDouble,
+        Self::QuaternionFloat,
         Self::Double2,
         Self::Float2,
         Self::Double3,

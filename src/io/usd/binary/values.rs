@@ -15,19 +15,64 @@ impl Crate<'_> {
     /// # Errors
     /// A file that is cut short or damaged.
     pub fn value(&self, attribute: &ReadAttribute) -> Parsed<Option<Value>> {
-        match attribute.value {
-            Some(value) if Type::of(value) == Some(Type::TimeSamples) => match self.first_sample(value)? {
-                Some(sample) => self.decoded(sample),
-                None => Ok(None),
-            },
-            Some(value) => self.decoded(value),
-            None => Ok(None),
-        }
+        Ok(self.first_value(attribute)?.map(|value| self.decoded(value)).transpose()?.flatten())
     }
 
-    /// Whether an attribute has a value that is not an empty array.
-    pub fn holds_values(&self, attribute: &ReadAttribute) -> bool {
-        attribute.value.is_some_and(|value| value & ARRAY == 0 || value & PAYLOAD != 0)
+    /// The numbers of a value that is no array, at the first of its times: of a vector (x, y, z), a quaternion (i, j, k, real), a matrix
+    /// (row by row), or one number; none for other types.
+    ///
+    /// # Errors
+    /// As [`Crate::value`].
+    pub fn numbers(&self, attribute: &ReadAttribute) -> Parsed<Option<Vec<f64>>> {
+        let value = self.first_value(attribute)?.filter(|value| value & ARRAY == 0);
+        let Some((value, class)) = value.and_then(|value| Some((value, Type::of(value)?))) else {
+            return Ok(None);
+        };
+        let payload = value & PAYLOAD;
+        let stored = |count: usize, size: usize| {
+            Cursor::at(self.bytes, payload)?.take((count * size) as u64).map(|bytes| bytes.chunks_exact(size))
+        };
+        let floats = |count| Ok(stored(count, 4)?.map(|bytes| f32::from_bytes(bytes).into()).collect());
+        let doubles = |count| Ok(stored(count, 8)?.map(f64::from_bytes).collect());
+        // Small integers stand in for the value.
+        let small = |index: usize| f64::from(payload.to_le_bytes()[index] as i8);
+        let numbers: Parsed<Vec<f64>> = match (class, value & INLINE != 0) {
+            (Type::Float | Type::Double, true) => Ok(vec![f32::from_bits(payload as u32).into()]),
+            (Type::Float3 | Type::Double3, true) => Ok((0..3).map(small).collect()),
+            (Type::Matrix4, true) => {
+                Ok((0..16).map(|index| if index % 5 == 0 { small(index / 5) } else { 0.0 }).collect())
+            }
+            (Type::Double, false) => doubles(1),
+            (Type::Float3, false) => floats(3),
+            (Type::Double3, false) => doubles(3),
+            (Type::QuaternionFloat, false) => floats(4),
+            (Type::QuaternionDouble, false) => doubles(4),
+            (Type::Matrix4, false) => doubles(16),
+            _ => return Ok(None),
+        };
+        numbers.map(Some)
+    }
+
+    /// An array of words; none if it has another type.
+    ///
+    /// # Errors
+    /// As [`Crate::value`].
+    pub fn words(&self, attribute: &ReadAttribute) -> Parsed<Vec<String>> {
+        let is_words = |value: &u64| value & ARRAY != 0 && Type::of(*value) == Some(Type::Token);
+        let Some(value) = attribute.value.filter(is_words) else { return Ok(Vec::new()) };
+        self.plain::<u32>(value)?.into_iter().map(|token| self.word(token)).collect()
+    }
+
+    fn word(&self, token: u32) -> Parsed<String> {
+        self.tokens.get(token as usize).cloned().ok_or_else(cut)
+    }
+
+    /// The value of an attribute, at the first of its times, as the file stores it.
+    fn first_value(&self, attribute: &ReadAttribute) -> Parsed<Option<u64>> {
+        match attribute.value {
+            Some(value) if Type::of(value) == Some(Type::TimeSamples) => self.first_sample(value),
+            value => Ok(value),
+        }
     }
 
     /// A number of the layer's metadata.
@@ -64,7 +109,6 @@ impl Crate<'_> {
             return self.array(class, value);
         }
         let (is_inline, payload) = (value & INLINE != 0, value & PAYLOAD);
-        let word = |token: u32| self.tokens.get(token as usize).cloned().ok_or_else(cut);
         let stored = || Cursor::at(self.bytes, payload);
         let float = f32::from_bits(payload as u32);
         Ok(Some(match (class, is_inline) {
@@ -72,10 +116,10 @@ impl Crate<'_> {
             // As a float, if that is exact.
             (Type::Double, true) => Value::Double(float.into()),
             (Type::Double, false) => Value::Double(f64::from_bits(stored()?.u64()?)),
-            (Type::Token, true) => Value::Token(word(payload as u32)?),
+            (Type::Token, true) => Value::Token(self.word(payload as u32)?),
             (Type::Text, true) => {
                 let token = self.strings.get(payload as u32 as usize).ok_or_else(cut)?;
-                Value::Text(word(*token)?)
+                Value::Text(self.word(*token)?)
             }
             _ => return Ok(None),
         }))
