@@ -144,10 +144,11 @@ test-clients: setup
 	@./tools/clients
 	cargo test --release --test testsuite -- --nocapture scene::clients:: motion::gltf::
 
-# OpenJD and Slurm make a shot as one process does; as root, installs them (apt-get, and PyPI into target/farm).
+# A shot by openjd-cli and by a Slurm on loopback, compared with that of one process; installs both (apt-get, and PyPI into target/clients).
 test-farm: setup
-	cargo build --release --bins
 	@./tools/farm
+	$(BUILD)
+	/usr/bin/python3 tests/clients/farm.py target/release/frazil target/farm
 
 # Blender's poses of CesiumMan, which tests/testsuite/motion/gltf.rs and a gate compare with.
 skinning-numbers:

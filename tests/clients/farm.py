@@ -1,203 +1,297 @@
-"""Makes a shot on real farms, and compares it with the shot of one process: farm.py FRAZIL FOLDER [OPENJD].
+"""Makes a shot with real farms, and compares it byte for byte with the shot of one process: python3 farm.py FRAZIL FOLDER
 
-OpenJD runs its tasks here; Slurm has one node on this machine, which needs root and Debian's slurmd, slurmctld, slurm-client and munge. Tasks
-are doubled, killed and queued again. Prints the count of files that differ.
+The farms are `openjd run`, twice at the same time, and a Slurm of two nodes that is started on loopback. In Slurm a stage is requeued while it
+is running and then finds the folder in use, a chunk is killed, another one runs twice, and pictures follow their chunks by aftercorr.
 """
 
-import json
+import contextlib
+import fcntl
+import getpass
 import os
+import pathlib
+import re
+import shlex
 import shutil
 import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
-from pathlib import Path
 
-CUBE = """v -.1 -.1 -.1
-v .1 -.1 -.1
-v -.1 .1 -.1
-v .1 .1 -.1
-v -.1 -.1 .1
-v .1 -.1 .1
-v -.1 .1 .1
-v .1 .1 .1
-f 1 3 4 2
-f 5 6 8 7
-f 1 2 6 5
-f 3 7 8 4
-f 1 5 7 3
-f 2 4 8 6
-"""
-SCENE = """[shot]
-frames = "1-24"
+FRAMES, CHUNK = 24, 6
+KILLED, DOUBLED = "7-12", "13-18"
+SCENE = f"""[shot]
+frames = "1-{FRAMES}"
 [snow]
 ground = 0.0
 area = [-0.5, -0.5, 0.5, 1.5]
 depth = 0.3
-cell = 0.02
+cell = 0.0125
 [grains]
-[mist]
 [output]
-fog = ["base", "grains", "mist"]
+fog = ["base", "grains"]
 mesh = ["usd"]
 objects = ["usd"]
 [[object]]
-file = "cube.obj"
-keys = [{ frame = 1, at = [0, 0.25, 0] }, { frame = 24, at = [0, 0.25, 0.9] }]
+file = "box.obj"
+keys = [{{ frame = 1, at = [0, 0.5, 0] }}, {{ frame = 8, at = [0, 0.25, 0] }}, {{ frame = {FRAMES}, at = [0, 0.25, 0.9] }}]
 """
-# Frames of a chunk, and the longest time (s) for a shot.
-CHUNK = "4"
-PATIENCE = 900
+CORNERS = [(x, y, z) for x in (-0.2, 0.2) for y in (-0.2, 0.2) for z in (-0.2, 0.2)]
+FACES = ["1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4"]
+REPOSITORY = pathlib.Path(__file__).resolve().parents[2]
+# Where make test-farm installs openjd, and where Debian has daemons, which is not on everybody's PATH.
+PATH = os.pathsep.join([str(REPOSITORY / "target/clients/bin"), os.environ.get("PATH", ""), "/usr/sbin"])
 
 
-def run(*command, **options):
-    return subprocess.run([str(word) for word in command], check=True, text=True, capture_output=True, **options).stdout
+def end(sentence):
+    sys.exit(f"farm: {sentence}")
 
 
-def files(folder):
-    """The files of a shot, without the times in reports and the folder's own account of its files, which has their times."""
-    found = (path for path in folder.rglob("*") if path.is_file())
-    names = (path.relative_to(folder) for path in found)
-    return {name for name in names if name.parts[0] != "report" and name.name not in ("files.json", "run.lock")}
+def program(name):
+    return shutil.which(name, path=PATH) or end(f"{name} is not installed: make test-farm installs it.")
 
 
-def differing(one, other):
-    names = files(one) | files(other)
-    equal = (name for name in names if all((folder / name).is_file() for folder in (one, other)))
-    return sorted(names - {name for name in equal if (one / name).read_bytes() == (other / name).read_bytes()})
+def run(*words, **more):
+    """What a command prints; the end if it fails."""
+    words = [str(word) for word in words]
+    done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, **more)
+    if done.returncode:
+        end(f"{shlex.join(words)} ended with {done.returncode}: {done.stdout[-3000:]}")
+    return done.stdout
 
 
-def openjd(frazil, openjd_program, folder):
-    """Every step after the ones that it depends on, as OpenJD's own runner does; then all chunks once more."""
-    job = folder / "job.json"
-    job.write_text(run(frazil, "jobs", "shot.toml", "-o", "openjd", "--for", "openjd", "--chunk", CHUNK, "--program", frazil, cwd=folder))
-    run(openjd_program, "check", job)
-    for step in [step["name"] for step in json.loads(job.read_text())["steps"]]:
-        times = 2 if step == "volumes" else 1
-        for _ in range(times):
-            run(openjd_program, "run", job, "--step", step)
-    return folder / "openjd"
+def wait(what, happened, seconds=300):
+    """Waits until something is true, and returns it."""
+    until = time.monotonic() + seconds
+    while not (value := happened()):
+        if time.monotonic() > until:
+            end(f"{what} did not happen in {seconds} s.")
+        time.sleep(0.005)
+    return value
 
 
-class Slurm:
-    """A controller and a node on the loopback interface."""
-
-    def __init__(self, folder):
-        self.folder = folder
-        host, cores = socket.gethostname().split(".")[0], os.cpu_count()
-        for part in ("state", "spool"):
-            (folder / part).mkdir(parents=True)
-        ports = [free_port(), free_port()]
-        settings = {
-            "ClusterName": "frazil",
-            "SlurmctldHost": f"{host}(127.0.0.1)",
-            "SlurmUser": "root",
-            "SlurmctldPort": ports[0],
-            "SlurmdPort": ports[1],
-            "StateSaveLocation": folder / "state",
-            "SlurmdSpoolDir": folder / "spool",
-            "SlurmctldPidFile": folder / "slurmctld.pid",
-            "SlurmdPidFile": folder / "slurmd.pid",
-            "SlurmctldLogFile": folder / "slurmctld.log",
-            "SlurmdLogFile": folder / "slurmd.log",
-            "CommunicationParameters": "NoCtldInAddrAny,NoInAddrAny",
-            "ProctrackType": "proctrack/pgid",
-            "TaskPlugin": "task/none",
-            "JobAcctGatherType": "jobacct_gather/none",
-            "AccountingStorageType": "accounting_storage/none",
-            "SchedulerParameters": "batch_sched_delay=0,sched_interval=1",
-            "SelectType": "select/cons_tres",
-            "SelectTypeParameters": "CR_CPU",
-            "MpiDefault": "none",
-            "SwitchType": "switch/none",
-        }
-        lines = [f"{name}={value}" for name, value in settings.items()]
-        lines += [f"NodeName={host} NodeAddr=127.0.0.1 CPUs={cores} State=UNKNOWN", f"PartitionName=main Nodes={host} Default=YES State=UP"]
-        self.config = folder / "slurm.conf"
-        self.config.write_text("\n".join(lines) + "\n")
-        self.environment = {**os.environ, "SLURM_CONF": str(self.config)}
-
-    def __enter__(self):
-        self.munge = None
-        if subprocess.run(["munge", "-n"], capture_output=True).returncode != 0:
-            Path("/run/munge").mkdir(exist_ok=True)
-            shutil.chown("/run/munge", "munge", "munge")
-            self.munge = subprocess.Popen(["runuser", "-u", "munge", "--", "munged", "--foreground"])
-            wait_until(lambda: subprocess.run(["munge", "-n"], capture_output=True).returncode == 0, "munge does not answer")
-        self.daemons = [subprocess.Popen([daemon, "-D", "-f", str(self.config)], env=self.environment) for daemon in ("slurmctld", "slurmd")]
-        wait_until(lambda: "idle" in self.answer("sinfo", "-h", "-o", "%t"), "Slurm's node is not idle")
-        return self
-
-    def __exit__(self, *_):
-        for daemon in [*reversed(self.daemons), *filter(None, [self.munge])]:
-            daemon.send_signal(signal.SIGTERM)
-            daemon.wait()
-
-    def answer(self, *command):
-        return subprocess.run(command, env=self.environment, text=True, capture_output=True).stdout
-
-    def jobs(self):
-        """States by name and number of those that have not ended well."""
-        lines = self.answer("squeue", "-h", "-r", "-t", "all", "-o", "%j|%i|%T").split()
-        return [line.split("|") for line in lines if not line.endswith("COMPLETED")]
+def processes(*words):
+    """The processes with these words in their commands. A shell's has the whole command of its job in one word."""
+    found = []
+    for path in pathlib.Path("/proc").glob("[0-9]*/cmdline"):
+        with contextlib.suppress(OSError):
+            if {str(word) for word in words} <= set(path.read_bytes().decode(errors="replace").split("\0")):
+                found.append(int(path.parent.name))
+    return found
 
 
-def slurm(frazil, folder):
-    script = folder / "submit.sh"
-    script.write_text(run(frazil, "jobs", "shot.toml", "-o", "slurm", "--for", "slurm", "--chunk", CHUNK, "--program", frazil, cwd=folder))
-    with Slurm(folder / "slurmd") as farm:
-        run("sh", script, cwd=folder, env=farm.environment)
-        # One task of a stage that remembers and one chunk are killed in their work, and go on.
-        for stage in ("grains", "volumes"):
-            running = lambda: [number for name, number, state in farm.jobs() if name.endswith(stage) and state == "RUNNING"]
-            wait_until(running, f"no task of {stage} runs", PATIENCE)
-            time.sleep(0.5)
-            for number in running()[:1]:
-                farm.answer("scontrol", "requeue", number)
-                print(f"frazil: killed and queued again: {stage}, job {number}", flush=True)
-        wait_until(lambda: not farm.jobs(), "jobs have not ended well", PATIENCE)
-        # A farm that loses track of what it did does it again.
-        chunks = run(frazil, "jobs", "shot.toml", "-o", "slurm", "--chunk", CHUNK, "--program", frazil, cwd=folder).splitlines()
-        for number, line in enumerate(line for line in chunks if line.startswith("volumes")):
-            farm.answer("sbatch", "--parsable", f"--job-name=again-{number}", f"--wrap={line.split(' ', 2)[2]}")
-        wait_until(lambda: not farm.jobs(), "doubled jobs have not ended well", PATIENCE)
-    return folder / "slurm"
+def different(one, other):
+    """Names of files that are not in both folders, or differ. Reports have times in them, and files.json when files were written."""
+
+    def files(folder):
+        paths = {str(path.relative_to(folder)): path for path in folder.rglob("*") if path.is_file()}
+        return {name: path for name, path in paths.items() if not name.startswith("report/") and not name.endswith(".lock")}
+
+    a, b = files(one), files(other)
+    common = [name for name in a.keys() & b.keys() if not name.endswith("files.json")]
+    return sorted((a.keys() ^ b.keys()) | {name for name in common if a[name].read_bytes() != b[name].read_bytes()})
 
 
-def free_port():
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return free.getsockname()[1]
+def make_scene(folder):
+    lines = ["v {} {} {}".format(*corner) for corner in CORNERS] + [f"f {face}" for face in FACES]
+    (folder / "box.obj").write_text("\n".join(lines) + "\n")
+    (folder / "shot.toml").write_text(SCENE)
 
 
-def wait_until(is_true, otherwise, seconds=60):
-    end = time.monotonic() + seconds
-    while not is_true():
-        if time.monotonic() > end:
-            sys.exit(f"farm.py: {otherwise} after {seconds} s")
-        time.sleep(0.2)
+def jobs(frazil, folder, farm, name):
+    return run(frazil, "jobs", folder / "shot.toml", "-o", folder / name, "--for", farm, "--chunk", CHUNK, "--program", frazil)
+
+
+def pictures(frazil, folder, name, frames):
+    """The words of the command that makes pictures of the box. By itself the camera sees all of the frames that are given, so it is placed."""
+    box, picture = folder / name / "objects/objects.%04d.usdc", folder / name / "picture.%04d.png"
+    words = [frazil, "preview", box, "--frames", frames, "-o", picture, "--size", "160x90", "--eye=-2,1.5,2.5", "--target=0,0.3,0.4", "-q"]
+    return [str(word) for word in words]
+
+
+def by_openjd(frazil, folder):
+    openjd = program("openjd")
+    template = folder / "openjd.json"
+    template.write_text(jobs(frazil, folder, "openjd", "openjd"))
+    run(openjd, "check", template)
+    # Two farms at once: all tasks twice.
+    logs = [folder / f"openjd.{number}.log" for number in (1, 2)]
+    both = [subprocess.Popen([openjd, "run", template], stdout=log.open("w"), stderr=subprocess.STDOUT) for log in logs]
+    try:
+        for process, log in zip(both, logs):
+            if process.wait():
+                end(f"openjd run ended with {process.returncode}: {log.read_text()[-3000:]}")
+    finally:
+        # openjd does not end by SIGTERM, nor does what it has started end with it.
+        for process in both:
+            process.kill()
+        for process in processes(folder / "openjd"):
+            os.kill(process, signal.SIGTERM)
+
+
+CONFIGURATION = """ClusterName=loopback
+SlurmctldHost={host}(127.0.0.1)
+SlurmctldPort={ports[0]}
+SlurmUser={user}
+SlurmdUser={user}
+AuthType=auth/munge
+AuthInfo=socket={folder}/munge.socket
+CredType=cred/munge
+CommunicationParameters=NoCtldInAddrAny,NoInAddrAny
+StateSaveLocation={folder}/state
+SlurmdSpoolDir={folder}/%n
+SlurmctldPidFile={folder}/slurmctld.pid
+SlurmdPidFile={folder}/%n.pid
+ProctrackType=proctrack/pgid
+TaskPlugin=task/none
+JobAcctGatherType=jobacct_gather/none
+AccountingStorageType=accounting_storage/none
+SchedulerType=sched/backfill
+SchedulerParameters=batch_sched_delay=0,sched_interval=1,bf_interval=1
+SelectType=select/cons_tres
+SelectTypeParameters=CR_CPU
+MpiDefault=none
+SwitchType=switch/none
+SlurmdParameters=config_overrides
+NodeName=n1 NodeHostname={host} NodeAddr=127.0.0.1 Port={ports[1]} CPUs=4
+NodeName=n2 NodeHostname={host} NodeAddr=127.0.0.1 Port={ports[2]} CPUs=4
+PartitionName=main Nodes=n1,n2 Default=YES State=UP
+"""
+
+
+@contextlib.contextmanager
+def slurm():
+    """A Slurm of two nodes, with a munged of its own, for this user. Nothing is left of it afterwards."""
+    daemons = [program(name) for name in ("munged", "slurmctld", "slurmd")]
+    for name in ("sbatch", "squeue", "sinfo", "scontrol", "scancel"):
+        program(name)
+    # In /tmp, since the name of a socket must be short.
+    folder = pathlib.Path(tempfile.mkdtemp(prefix="frazil-slurm-"))
+    folder.chmod(0o755)
+    for name in ("state", "n1", "n2"):
+        (folder / name).mkdir()
+    (folder / "munge.key").write_bytes(os.urandom(128))
+    (folder / "munge.key").chmod(0o400)
+    with socket.create_server(("127.0.0.1", 0)) as a, socket.create_server(("127.0.0.1", 0)) as b, socket.create_server(("127.0.0.1", 0)) as c:
+        ports = [one.getsockname()[1] for one in (a, b, c)]
+    host = socket.gethostname().split(".")[0]
+    (folder / "slurm.conf").write_text(CONFIGURATION.format(host=host, ports=ports, user=getpass.getuser(), folder=folder))
+    os.environ["SLURM_CONF"] = str(folder / "slurm.conf")
+    munge = [f"--{name}-file={folder}/munge.{name}" for name in ("key", "pid", "log", "seed")] + [f"--socket={folder}/munge.socket"]
+    started = []
+
+    def start(name, *words):
+        # In sessions of their own: Ctrl-C must not end them before their jobs.
+        more = {"stdout": (folder / f"{name}.log").open("w"), "stderr": subprocess.STDOUT, "start_new_session": True}
+        started.append(subprocess.Popen(words, **more))
+
+    try:
+        start("munged", daemons[0], "-F", "-f", *munge)
+        wait("munged", (folder / "munge.socket").exists, 20)
+        start("slurmctld", daemons[1], "-D")
+        for node in ("n1", "n2"):
+            start(node, daemons[2], "-D", "-N", node)
+        idle = ["sinfo", "-h", "-N", "-t", "idle", "-o", "%N"]
+        wait("two idle nodes", lambda: len(subprocess.run(idle, capture_output=True, text=True).stdout.split()) == 2, 60)
+        try:
+            yield
+        finally:
+            run("scancel", "--full", f"--user={getpass.getuser()}")
+            wait("the end of all jobs", lambda: not run("squeue", "-h"), 60)
+    except BaseException:
+        for log in folder.glob("*.log"):
+            print(f"{log.name}: {log.read_text()[-2000:]}", file=sys.stderr)
+        raise
+    finally:
+        for process in reversed(started):
+            process.terminate()
+        for process in started:
+            process.wait(60)
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def known_jobs():
+    """What Slurm knows of each job and each task of an array: the name, its index if it has one, state and number of restarts."""
+    found = {}
+    for line in run("scontrol", "show", "jobs", "-o").splitlines():
+        fields = dict(re.findall(r"(\w+)=(\S*)", line))
+        found[fields["JobName"], fields.get("ArrayTaskId")] = fields
+    return found
+
+
+def restarts(name, task=None):
+    return int(known_jobs()[name, task]["Restarts"])
+
+
+def hurry():
+    """Starts jobs now that are queued again, which Slurm does after two minutes."""
+    for line in run("squeue", "-h", "-r", "-t", "PENDING", "-o", "%i %r").splitlines():
+        if line.endswith("BeginTime"):
+            subprocess.run(["scontrol", "update", f"JobId={line.split()[0]}", "StartTime=now"], capture_output=True)
+
+
+def by_slurm(frazil, folder):
+    output, logs = folder / "slurm", folder / "logs"
+    logs.mkdir()
+    script = jobs(frazil, folder, "slurm", "slurm")
+    # Busy is busy soon.
+    (folder / "slurm.sh").write_text(script.replace("--wait 600", "--wait 1"))
+    with slurm():
+        options = [f"--output={logs}/%x.%j.log", "--open-mode=append"]
+        finish = run("sh", folder / "slurm.sh", *options).strip()
+        number = {name: fields.get("ArrayJobId", fields["JobId"]) for (name, _), fields in known_jobs().items()}
+        assert number["shot-finish"] == finish, number
+        chunk = [frazil, "snow", folder / "shot.toml", "-o", output, "--chunk", "--stage", "volumes", "--frames", DOUBLED, "--wait", "9"]
+        wrap = shlex.join(str(word) for word in chunk)
+        run("sbatch", *options, "--job-name=doubled", f"--dependency=afterok:{number['shot-grains']}", f"--wrap={wrap}")
+        frames = f"$((SLURM_ARRAY_TASK_ID * {CHUNK} + 1))-$((SLURM_ARRAY_TASK_ID * {CHUNK} + {CHUNK}))"
+        wrap = shlex.join(pictures(frazil, folder, "slurm", "FRAMES")).replace("FRAMES", frames)
+        after = f"--dependency=aftercorr:{number['shot-objects']}"
+        run("sbatch", *options, "--job-name=pictures", f"--array=0-{FRAMES // CHUNK - 1}", after, f"--wrap={wrap}")
+
+        # A stage is queued again while it is at work, and does not get the folder when it comes back.
+        wait("a frame of the base", lambda: (output / "state/base.0003.json").exists())
+        run("scontrol", "requeue", number["shot-base"])
+        wait("the end of the base", lambda: not processes(output, "base"))
+        assert not (output / f"state/base.{FRAMES:04d}.json").exists(), "the base was done before it was stopped"
+        with (output / "state/run.lock").open("a") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            wait("busy", lambda: (hurry(), time.sleep(0.2), restarts("shot-base") >= 2)[-1])
+
+        # A chunk is killed.
+        first, last = (int(frame) for frame in KILLED.split("-"))
+
+        def chunk_at_work():
+            hurry()
+            return (output / f"fog/fog.{first:04d}.vdb").exists() and processes(output, "volumes", KILLED)
+
+        for process in wait("a frame of the chunk", chunk_at_work):
+            os.kill(process, signal.SIGKILL)
+        assert not (output / f"fog/fog.{last:04d}.vdb").exists(), "the chunk was done before it was killed"
+        wait("the end of all jobs", lambda: (hurry(), time.sleep(0.2), not run("squeue", "-h"))[-1])
+        for (name, task), fields in known_jobs().items():
+            if fields["JobState"] != "COMPLETED":
+                end(f"{name} {task or ''} ended as {fields['JobState']}: see {logs}.")
+        assert restarts("shot-volumes", str((first - 1) // CHUNK)) == 1, "the chunk was not queued again"
 
 
 def main():
-    frazil, folder = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
-    openjd_program = shutil.which(sys.argv[3] if len(sys.argv) > 3 else "openjd")
-    missing = [name for name in ("sbatch", "slurmctld", "slurmd", "munge") if not shutil.which(name)]
-    if missing or not openjd_program:
-        sys.exit(f"farm.py: not installed: {', '.join(missing + ([] if openjd_program else ['openjd']))}")
+    # Ends by an exception, so that nothing is left at work.
+    signal.signal(signal.SIGTERM, lambda *_: end("terminated."))
+    frazil, folder = (pathlib.Path(word).resolve() for word in sys.argv[1:3])
+    shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    (folder / "cube.obj").write_text(CUBE)
-    (folder / "shot.toml").write_text(SCENE)
-    run(frazil, "snow", "shot.toml", "-o", "one", "-q", cwd=folder)
-    count = 0
-    for made in (openjd(frazil, openjd_program, folder), slurm(frazil, folder)):
-        found = differing(folder / "one", made)
-        for name in found:
-            print(f"differs on {made.name}: {name}")
-        print(f"frazil: {made.name}: {len(files(made))} files, {len(found)} differ", flush=True)
-        count += len(found)
-    print(f"farm.equal {count}")
-    return count > 0
+    make_scene(folder)
+    run(frazil, "snow", folder / "shot.toml", "-o", folder / "one", "-q")
+    by_openjd(frazil, folder)
+    differing = [f"openjd/{name}" for name in different(folder / "one", folder / "openjd")]
+    by_slurm(frazil, folder)
+    run(*pictures(frazil, folder, "one", f"1-{FRAMES}"))
+    differing += [f"slurm/{name}" for name in different(folder / "one", folder / "slurm")]
+    print(*[f"farm: {name} differs" for name in differing], f"farm.equal {len(differing)}", sep="\n")
+    return 1 if differing else 0
 
 
-sys.exit(main())
+if __name__ == "__main__":
+    sys.exit(main())

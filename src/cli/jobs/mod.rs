@@ -1,4 +1,4 @@
-//! `frazil jobs`: what a farm runs to make a shot.
+//! `frazil jobs`: the tasks of a shot for a farm.
 
 mod openjd;
 mod slurm;
@@ -11,8 +11,8 @@ use frazil::scene::{Override, Scene, System, shallow};
 use super::output;
 use super::session::{Failure, OrFailure, Session};
 
-/// Print the tasks that a farm runs to make a shot: one that prepares the folder, one for each stage that goes from frame to frame, chunks
-/// of the stages whose frames depend on no other, and one that finishes.
+/// Print the tasks of a shot for a farm: one that prepares the folder, one for each stage that goes from frame to frame, chunks of the
+/// stages whose frames do not depend on each other, and one that finishes.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -21,7 +21,7 @@ Examples:
 pub struct Args {
     /// Scene file (TOML).
     scene: PathBuf,
-    /// Folder for the output, which all machines see under this path.
+    /// Folder for the output, under the same path on all machines.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// The farm.
@@ -30,7 +30,7 @@ pub struct Args {
     /// Frames of a chunk.
     #[arg(long, value_name = "N", default_value = "24", value_parser = clap::value_parser!(u16).range(1..))]
     chunk: u16,
-    /// The program, as the machines of the farm know it.
+    /// Path of frazil on the machines of the farm.
     #[arg(long, value_name = "PATH", default_value = "frazil")]
     program: String,
     /// Override a setting of the scene, for instance snow.noise.seed=2 or object.1.file=hero.glb.
@@ -40,7 +40,7 @@ pub struct Args {
 
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Farm {
-    /// For people and other farms: a task on each line: its name, the tasks that it waits for (a,b or -), and its command.
+    /// For people and other farms, a line for each task: its name, the tasks that it depends on (a,b or -), and its command.
     List,
     /// A shell script that submits to Slurm.
     Slurm,
@@ -51,7 +51,7 @@ enum Farm {
 /// A task of a job.
 struct Task {
     name: String,
-    /// The tasks that must be done before.
+    /// The tasks that it depends on.
     after: Vec<String>,
     /// Program and arguments; those of a chunk without its frames.
     command: Vec<String>,
@@ -59,7 +59,7 @@ struct Task {
     chunks: Vec<[i32; 2]>,
 }
 
-/// The time that a task waits for another one that is still at work in the folder (s), such as one that the farm takes for dead.
+/// How long a task waits (s) for another that still writes into the folder, for instance one that the farm believes dead.
 const WAIT: &str = "600";
 
 /// Runs the command.
@@ -70,7 +70,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let text = match args.farm {
         Farm::List => tasks.iter().map(listed).collect(),
         Farm::Slurm => slurm::script(&name, &tasks),
-        Farm::Openjd => openjd::template(&name, &tasks),
+        Farm::Openjd => openjd::template(&name, &tasks).map_err(Failure::refused)?,
     };
     output::print(&text).or_fail()
 }
@@ -134,7 +134,7 @@ impl Args {
             tasks.push(Task { chunks: chunks.clone(), ..task(stage, &before, command) });
             last.push(stage.to_string());
         }
-        // What all others wait for need not be named.
+        // The chunks depend on it already.
         if last.len() > 1 {
             last.retain(|name| !before.contains(name));
         }

@@ -4,19 +4,34 @@ use serde_json::{Value, json};
 
 use super::Task;
 
+/// Values that a parameter of a task may have, by the specification.
+const MAX_VALUES: usize = 1024;
+
 /// The template, in JSON, which is also YAML.
-pub(super) fn template(name: &str, tasks: &[Task]) -> String {
-    let steps: Vec<Value> = tasks.iter().map(step).collect();
+///
+/// # Errors
+/// A word that would be taken for an expression; too many chunks.
+pub(super) fn template(name: &str, tasks: &[Task]) -> Result<String, String> {
+    let steps: Vec<Value> = tasks.iter().map(step).collect::<Result<_, _>>()?;
     // A name has up to 64 characters that can be printed.
     let name: String = name.chars().filter(|letter| !letter.is_control()).take(64).collect();
     let name = if name.is_empty() { "shot".to_string() } else { name };
-    let template =
-        json!({ "specificationVersion": "jobtemplate-2023-09", "name": escaped(&name), "steps": steps });
-    format!("{template:#}\n")
+    let name = name.replace("{{", "{ {");
+    let template = json!({ "specificationVersion": "jobtemplate-2023-09", "name": name, "steps": steps });
+    Ok(format!("{template:#}\n"))
 }
 
-fn step(task: &Task) -> Value {
-    let mut arguments: Vec<String> = task.command[1..].iter().map(|word| escaped(word)).collect();
+fn step(task: &Task) -> Result<Value, String> {
+    if let Some(word) = task.command.iter().find(|word| word.contains("{{")) {
+        return Err(format!("\"{word}\": OpenJD would take what follows {{{{ for an expression"));
+    }
+    let count = task.chunks.len();
+    if count > MAX_VALUES {
+        return Err(format!(
+            "OpenJD allows {MAX_VALUES} chunks for a stage, not {count}: use a larger --chunk"
+        ));
+    }
+    let (command, mut arguments) = (&task.command[0], task.command[1..].to_vec());
     let mut step = json!({ "name": task.name });
     if !task.after.is_empty() {
         step["dependencies"] = task.after.iter().map(|name| json!({ "dependsOn": name })).collect();
@@ -32,12 +47,6 @@ fn step(task: &Task) -> Value {
         });
         arguments.push("{{Task.Param.First}}-{{Task.Param.Last}}".into());
     }
-    step["script"] =
-        json!({ "actions": { "onRun": { "command": escaped(&task.command[0]), "args": arguments } } });
-    step
-}
-
-/// A text in which nothing is taken for an expression.
-fn escaped(text: &str) -> String {
-    text.replace("{{", "{ {")
+    step["script"] = json!({ "actions": { "onRun": { "command": command, "args": arguments } } });
+    Ok(step)
 }

@@ -15,7 +15,7 @@ use std::path::Path;
 
 use super::files::caught::caught;
 use super::files::{atomic, source};
-use crate::error::{Error, Result, fail_if};
+use crate::error::{Error, Result, fail_if, one_line};
 use crate::geometry::{DVec3, DetailedMesh, PolygonMesh, TriMesh};
 
 pub use ply_write::Carried;
@@ -103,9 +103,9 @@ fn parse(path: &Path, bytes: &[u8], origin: DVec3) -> Result<PolygonMesh> {
             EXTENSIONS.map(|e| format!(".{e}")).join(", ")
         )),
     };
-    let (mesh, warning) = caught(path, || parse().map_err(|what| Error::file(path, what)))?;
+    let (mesh, warning) = caught(path, || parse().map_err(|what| Error::file(path, one_line(&what))))?;
     if let Some(warning) = warning {
-        log::warn!("{}: {warning}", path.display());
+        log::warn!("{}: {}", path.display(), one_line(&warning));
     }
     Ok(mesh)
 }

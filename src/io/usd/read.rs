@@ -58,7 +58,7 @@ impl<'a> UsdFile<'a> {
         self.transforms.get(&prim.path).cloned().unwrap_or_else(|| Err("it is not in the file".into()))
     }
 
-    /// Whether a prim's transform exchanges left and right.
+    /// Whether a prim's transform mirrors it.
     ///
     /// # Errors
     /// A transform that cannot be read.
@@ -66,7 +66,7 @@ impl<'a> UsdFile<'a> {
         Ok(self.transform(prim)?.mirrors())
     }
 
-    /// Ratio of lengths in metres to a prim's lengths.
+    /// Metres per unit of length in a prim's space.
     ///
     /// # Errors
     /// A transform that cannot be read.

@@ -1,5 +1,5 @@
-//! Transforms of prims that are read (USD's schema Xformable): the operations that `xformOpOrder` lists, the first one outermost, under
-//! those of the prims above.
+//! Transforms of prims that are read (USD's schema Xformable): the product of the operations in `xformOpOrder`, the last of which is applied
+//! to a point first, and of the transforms of the parent prims.
 
 use std::collections::HashMap;
 
@@ -18,7 +18,7 @@ pub(super) type Transforms = HashMap<String, Parsed<Transform>>;
 
 /// Names an operation that is to be inverted.
 const INVERSE: &str = "!invert!";
-/// Stands first in the order of a prim that ignores the transforms above it.
+/// First in the order of a prim that ignores the transforms of its parents.
 const RESET: &str = "!resetXformStack!";
 /// Namespace of operations.
 const OPERATION: &str = "xformOp:";
@@ -29,17 +29,17 @@ impl Transform {
         self.vector(point) + self.0.fixed_view::<3, 1>(0, 3)
     }
 
-    /// A velocity in the layer's space; that of the transform itself does not count.
+    /// A velocity in the layer's space, without the motion of an animated transform.
     pub fn vector(&self, vector: DVec3) -> DVec3 {
         self.linear() * vector
     }
 
-    /// Whether it exchanges left and right: faces that were counter-clockwise seen from outside are clockwise.
+    /// Whether it mirrors: faces that are counter-clockwise seen from outside become clockwise.
     pub fn mirrors(&self) -> bool {
         self.linear().determinant() < 0.0
     }
 
-    /// Ratio of lengths in the layer's space to those of the prim; a mean, if it is not the same in all directions.
+    /// By how much it scales lengths: the geometric mean, if directions differ.
     pub fn scale(&self) -> f64 {
         libm::cbrt(self.linear().determinant().abs())
     }
@@ -52,24 +52,28 @@ impl Transform {
 /// The transforms of all prims of a crate.
 pub(super) fn of_all(data: &Crate<'_>) -> Transforms {
     let mut all = Transforms::new();
-    // Those above a prim come before it.
+    // Parents come first.
     for prim in data.prims() {
-        let above = prim.path.rsplit_once('/').and_then(|(above, _)| all.get(above));
-        let above = above.cloned().unwrap_or(Ok(Transform(Matrix4::identity())));
-        all.insert(prim.path.clone(), of_prim(data, prim, above));
+        let parent = prim.path.rsplit_once('/').and_then(|(parent, _)| all.get(parent));
+        let parent = parent.cloned().unwrap_or(Ok(Transform(Matrix4::identity())));
+        all.insert(prim.path.clone(), of_prim(data, prim, parent));
     }
     all
 }
 
-fn of_prim(data: &Crate<'_>, prim: &ReadPrim, above: Parsed<Transform>) -> Parsed<Transform> {
+fn of_prim(data: &Crate<'_>, prim: &ReadPrim, parent: Parsed<Transform>) -> Parsed<Transform> {
     let order = prim.attribute("xformOpOrder").map_or(Ok(Vec::new()), |order| data.words(order))?;
     let resets = order.first().is_some_and(|first| first == RESET);
-    let mut matrix = if resets { Matrix4::identity() } else { above?.0 };
+    let mut matrix = if resets { Matrix4::identity() } else { parent?.0 };
     for name in &order[usize::from(resets)..] {
-        matrix *= operation(data, prim, name).map_err(|what| format!("{}: {what}", prim.path))?;
+        matrix *= operation(data, prim, name)?;
     }
     let is_finite = matrix.iter().all(|number| number.is_finite());
-    if is_finite { Ok(Transform(matrix)) } else { Err(format!("{}: its transform is not finite", prim.path)) }
+    if is_finite {
+        Ok(Transform(matrix))
+    } else {
+        Err(format!("the transform of {} is not finite", prim.path))
+    }
 }
 
 /// The matrix of an operation of `xformOpOrder`.
@@ -78,11 +82,11 @@ fn operation(data: &Crate<'_>, prim: &ReadPrim, name: &str) -> Parsed<Matrix4<f6
     let numbers = prim.attribute(name).map_or(Ok(None), |attribute| data.numbers(attribute))?;
     let kind = name.strip_prefix(OPERATION).and_then(|name| name.split(':').next());
     let matrix = kind.zip(numbers).and_then(|(kind, numbers)| matrix(kind, &numbers));
-    let matrix = matrix.ok_or_else(|| format!("its transform `{name}` cannot be read"))?;
+    let matrix = matrix.ok_or_else(|| format!("the transform `{name}` of {} cannot be read", prim.path))?;
     if !is_inverse {
         return Ok(matrix);
     }
-    matrix.try_inverse().ok_or_else(|| format!("its transform `{name}` has no inverse"))
+    matrix.try_inverse().ok_or_else(|| format!("the transform `{name}` of {} has no inverse", prim.path))
 }
 
 /// The matrix of an operation with these numbers; none for an unknown one, or other numbers than it has.
@@ -96,8 +100,10 @@ fn matrix(kind: &str, numbers: &[f64]) -> Option<Matrix4<f64>> {
         ("orient", [i, j, k, real]) => {
             UnitQuaternion::try_new(Quaternion::new(*real, *i, *j, *k), 0.0)?.to_homogeneous()
         }
-        // USD multiplies rows by matrices, so that its rows are columns here.
-        ("transform", numbers) if numbers.len() == 16 => Matrix4::from_column_slice(numbers),
+        // USD multiplies rows by matrices, so that its rows are columns here. A projection is refused.
+        ("transform", [_, _, _, 0.0, _, _, _, 0.0, _, _, _, 0.0, _, _, _, 1.0]) => {
+            Matrix4::from_column_slice(numbers)
+        }
         _ => return None,
     })
 }
@@ -140,7 +146,13 @@ mod tests {
         assert_eq!(moved("orient", &[half, 0.0, 0.0, half], [0.0, 1.0, 0.0]), [0.0, 0.0, 1.0]);
         let rows = [0.0, 1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 5.0, 6.0, 7.0, 1.0];
         assert_eq!(moved("transform", &rows, [1.0, 0.0, 0.0]), [5.0, 7.0, 7.0]);
-        for (kind, numbers) in [("translate", &[1.0][..]), ("rotateXX", &[1.0, 1.0]), ("shear", &[1.0; 3])] {
+        let refused = [
+            ("translate", &[1.0][..]),
+            ("rotateXX", &[1.0, 1.0]),
+            ("shear", &[1.0; 3]),
+            ("transform", &[1.0; 16]),
+        ];
+        for (kind, numbers) in refused {
             assert_eq!(matrix(kind, numbers), None, "{kind}");
         }
         let transform = |kind, numbers: &[f64]| Transform(matrix(kind, numbers).unwrap());

@@ -15,6 +15,7 @@ pub struct Override {
     text: String,
 }
 
+/// As it was typed.
 impl std::fmt::Display for Override {
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         out.write_str(&self.text)
@@ -36,11 +37,6 @@ impl std::str::FromStr for Override {
 }
 
 impl Override {
-    /// As it was typed.
-    pub(in crate::scene) fn text(&self) -> &str {
-        &self.text
-    }
-
     /// Puts the value into a document; `offset` stands for the setting in errors.
     pub(in crate::scene) fn apply<'i>(
         &'i self,

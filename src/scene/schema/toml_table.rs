@@ -24,7 +24,7 @@ impl Document<'_> {
     /// An error at a byte offset of the text: `shot.toml:12: ...`.
     pub fn error(&self, offset: usize, what: impl std::fmt::Display) -> Error {
         if let Some(setting) = self.override_at(offset) {
-            return Error::argument(format!("{}: --set {}: {what}", self.path.display(), setting.text()));
+            return Error::argument(format!("{}: --set {}: {what}", self.path.display(), setting));
         }
         let line = 1 + self.text.bytes().take(offset).filter(|&byte| byte == b'\n').count();
         Error::argument(format!("{}:{line}: {what}", self.path.display()))

@@ -6,7 +6,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use crate::common::character::output;
-use crate::program::{CUBE, Folder, command, fails, frazil, works};
+use crate::program::{CUBE, Folder, command, fails, works};
 
 /// A cube that slides through snow, with grains, and files to render.
 fn folder(frames: u32) -> Folder {
@@ -107,19 +107,13 @@ fn chunks_and_runs_keep_out_of_each_others_way() {
     fails(folder, &chunk("objects", "1-3"), 75, &["another run"]);
     run.kill().unwrap();
     run.wait().unwrap();
-    // Chunks beside a chunk, but no run.
-    let mut chunk_at_work = command(folder, &format!("{} -q", chunk("objects", "1-300"))).spawn().unwrap();
-    while !folder.join("out/state/objects.0001.json").exists() {
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    let busy = frazil(folder, "snow shot.toml -o out -q --stage objects --frames 1-2");
-    let beside = frazil(folder, &format!("{} -q", chunk("objects", "298-300")));
-    let was_at_work = chunk_at_work.try_wait().unwrap().is_none();
-    chunk_at_work.wait().unwrap();
-    assert!(beside.status.success());
-    if was_at_work {
-        assert_eq!(busy.status.code(), Some(75));
-    }
+    // Chunks beside a chunk, but no run. This process holds the lock as a chunk at work does.
+    let lock = fs::File::options().append(true).open(folder.join("out/state/run.lock")).unwrap();
+    lock.lock_shared().unwrap();
+    works(folder, &format!("{} -q", chunk("objects", "1-3")));
+    fails(folder, "snow shot.toml -o out -q --stage objects --frames 1-5", 75, &["another run"]);
+    lock.unlock().unwrap();
+    works(folder, "snow shot.toml -o out -q --stage objects --frames 1-5");
 }
 
 #[test]
@@ -136,6 +130,20 @@ fn templates_name_every_task() {
         assert!(script.contains(words), "no {words} in {script}");
     }
     assert!(shell(folder, &format!("sbatch() {{ echo 7; }}\n{script}")).status().unwrap().success());
+    // A job queues itself again if it was busy, or was killed up to three times.
+    let script = works(folder, "jobs shot.toml -o out --for slurm --program made");
+    let slurm = "made() { return \"$CODE\"; }\nscontrol() { echo \"$*\" >&2; }\n\
+         sbatch() { for word; do :; done; (eval \"${word#--wrap=}\") >&2 || :; echo 7; }\n";
+    for (code, restarts, wanted) in [("75", "9", 6), ("137", "2", 6), ("137", "3", 0), ("1", "0", 0)] {
+        let said = shell(folder, &format!("{slurm}{script}"))
+            .envs([("CODE", code), ("SLURM_RESTART_COUNT", restarts)])
+            .envs([("SLURM_JOB_ID", "5"), ("SLURM_ARRAY_TASK_ID", "0")])
+            .output()
+            .unwrap();
+        assert!(said.status.success());
+        let words = String::from_utf8_lossy(&said.stderr).into_owned();
+        assert_eq!(words.matches("requeue 5").count(), wanted, "{code} {restarts}: {words}");
+    }
     let template = works(folder, "jobs shot.toml -o out --for openjd --chunk 3");
     let template: serde_json::Value = serde_json::from_str(&template).unwrap();
     let volumes =
@@ -145,4 +153,6 @@ fn templates_name_every_task() {
         serde_json::json!([3, 6, 8])
     );
     assert_eq!(volumes["dependencies"][0]["dependsOn"], "grains");
+    fails(folder, "jobs shot.toml -o a{{b --for openjd", 2, &["a{{b", "expression"]);
+    fails(&self::folder(1025), "jobs shot.toml -o out --for openjd --chunk 1", 2, &["1025", "--chunk"]);
 }
