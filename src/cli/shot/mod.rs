@@ -91,6 +91,10 @@ impl ShotArgs {
         frames: &FrameChoice,
         on_report: impl FnMut(&Report) + Send,
     ) -> Result<(), Failure> {
+        if self.finish && !self.output.join("state").is_dir() {
+            let what = "was not prepared: run the same command with --prepare first";
+            return Err(Failure::of_file(&self.output, what));
+        }
         let run = self.prepare(session, pipeline, stages, frames)?;
         output::check_folder(&self.output).or_refuse()?;
         let existing = run.existing();

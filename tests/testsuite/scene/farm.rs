@@ -93,6 +93,8 @@ fn chunks_and_runs_keep_out_of_each_others_way() {
         format!("snow shot.toml -o out --chunk --stage {stage} --frames {frames}")
     };
     fails(folder, &chunk("objects", "1-3"), 2, &["out", "--prepare"]);
+    fails(folder, "snow shot.toml -o out --finish", 2, &["out", "--prepare"]);
+    assert!(!folder.join("out").exists());
     works(folder, "snow shot.toml -o out -q --prepare --frames 1-300");
     fails(folder, &chunk("base", "1-3"), 2, &["stage base", "chunks"]);
     fails(folder, &chunk("objects", "300-301"), 2, &["frame 301", "--prepare"]);
