@@ -238,7 +238,7 @@ impl Role {
 }
 
 /// Which files are written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Output {
     /// `base/base.%04d.vdb`.
     pub base: bool,
@@ -258,6 +258,8 @@ pub struct Output {
     pub grains_delta: bool,
     /// `mist/mist.%04d.vdb`.
     pub mist: bool,
+    /// Whether its values have 16 bits; `state/` keeps what resuming needs.
+    pub mist_half: bool,
     /// Volumes to render.
     pub volumes: VolumesOutput,
     /// `objects/objects.%04d.usdc`: the moving objects, with velocities.
@@ -269,7 +271,7 @@ pub struct Output {
 }
 
 /// Which volumes for rendering, and which meshes, are written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct VolumesOutput {
     /// In `fog/fog.%04d.vdb`: the density of the base.
     pub fog_base: bool,
@@ -283,6 +285,8 @@ pub struct VolumesOutput {
     pub mesh_ply: bool,
     /// `mesh/mesh.%04d.usdc`: the surface of the base.
     pub mesh_usd: bool,
+    /// How far the triangles of these meshes are merged where the surface is flat, in 0..=1.
+    pub mesh_adaptivity: f64,
 }
 
 impl VolumesOutput {

@@ -20,10 +20,15 @@ pub type Settings = BTreeMap<String, String>;
 
 /// Keys whose defaults have changed: what a folder that was made before has, and what the same scene says now. Such a folder is resumed:
 /// its frames stay as they are, and new ones are written in the new way.
-const NEW_DEFAULTS: [(&str, Option<&str>, &str); 3] = [
-    ("output.surface", Some(r#"["ply"]"#), r#"["usd"]"#),
-    ("output.liquid", Some(r#"["ply"]"#), r#"["usd"]"#),
-    ("output.terrain", None, r#"["usd"]"#),
+const NEW_DEFAULTS: [(&str, Option<&str>, Option<&str>); 8] = [
+    ("output.surface", Some(r#"["ply"]"#), Some(r#"["usd"]"#)),
+    ("output.liquid", Some(r#"["ply"]"#), Some(r#"["usd"]"#)),
+    ("output.terrain", None, Some(r#"["usd"]"#)),
+    ("output.grains", Some(r#"["vdb"]"#), Some(r#"["vdb", "usd"]"#)),
+    ("output.mist_half", None, Some("true")),
+    ("output.mesh", Some("[]"), None),
+    ("output.mesh_adaptivity", None, Some("0.01")),
+    ("output.objects", Some("[]"), Some(r#"["usd"]"#)),
 ];
 
 /// The keys whose values differ, each with the former value.
@@ -31,10 +36,7 @@ pub(in crate::scene) fn changed(before: &Settings, after: &Settings) -> Vec<Stri
     let keys: BTreeSet<&String> = before.keys().chain(after.keys()).collect();
     let differs = |key: &&&String| {
         let (was, is) = (before.get(**key).map(String::as_str), after.get(**key).map(String::as_str));
-        let is_new_default = |(name, former, now): &(&str, Option<&str>, &str)| {
-            *name == **key && *former == was && Some(*now) == is
-        };
-        was != is && !NEW_DEFAULTS.iter().any(is_new_default)
+        was != is && !NEW_DEFAULTS.contains(&(key.as_str(), was, is))
     };
     let described = |key: &String| match (before.get(key), override_key(key)) {
         (Some(value), key) if value.starts_with(CONTENT) => format!("{key} had different contents"),

@@ -23,7 +23,7 @@ pub fn pipeline<'a>(scene: &'a Scene, inputs: &'a Inputs) -> Pipeline<'a> {
     if volumes.fog() || volumes.snow || volumes.mesh() {
         stages.push(Box::new(Volumes::new(scene, inputs)));
     }
-    if scene.output.objects_usd || scene.output.objects_ply {
+    if (scene.output.objects_usd || scene.output.objects_ply) && !inputs.bodies.is_empty() {
         stages.push(Box::new(Objects::new(scene, &inputs.bodies, &inputs.input_hashes)));
     }
     Pipeline { scene, input_hashes: &inputs.input_hashes, stages }

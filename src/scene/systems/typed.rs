@@ -41,7 +41,7 @@ impl Output {
         let output = values.table("output");
         let is_on = |name: &str| output.find(name) == Some(true);
         let is_delta = |name: &str| output.text(name) == Some("delta");
-        Self {
+        let mut all = Self {
             base: output.holds("base", "vdb"),
             base_mode: if is_delta("base_mode") { BaseMode::Delta } else { BaseMode::Full },
             half: is_on("half"),
@@ -51,6 +51,7 @@ impl Output {
             grains_usd: output.holds("grains", "usd"),
             grains_delta: is_delta("grains_mode"),
             mist: output.holds("mist", "vdb"),
+            mist_half: is_on("mist_half"),
             volumes: VolumesOutput {
                 fog_base: output.holds("fog", "base"),
                 fog_grains: output.holds("fog", "grains"),
@@ -58,11 +59,15 @@ impl Output {
                 snow: is_on("snow"),
                 mesh_ply: output.holds("mesh", "ply"),
                 mesh_usd: output.holds("mesh", "usd"),
+                mesh_adaptivity: output.find("mesh_adaptivity").unwrap_or_default(),
             },
             objects_usd: output.holds("objects", "usd"),
             objects_ply: output.holds("objects", "ply"),
             usd: is_on("usd"),
-        }
+        };
+        // By default, the mesh is written where it can be made: other systems write no base.
+        all.volumes.mesh_usd |= output.value("mesh").is_none() && all.base_restarts();
+        all
     }
 
     /// Checks the keys in combination.

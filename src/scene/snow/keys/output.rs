@@ -1,7 +1,7 @@
 //! The keys of `[output]` in scenes with snow.
 
-use crate::scene::schema::declaration::Kind::{Choice, Choices, Flag};
-use crate::scene::schema::declaration::{Key, Scope, Scopes, key, or};
+use crate::scene::schema::declaration::Kind::{Choice, Choices, Flag, Number};
+use crate::scene::schema::declaration::{Key, Scope, Scopes, key, optional, or};
 
 const BASE: Scopes = &[("base", Scope::Output)];
 const GRAINS: Scopes = &[("grains", Scope::Output)];
@@ -18,18 +18,21 @@ pub const OUTPUT_KEYS: &[Key] = &[
     key(BASE, "output", "half", Flag, or("false")).means("16-bit values, for rendering only"),
     key(BASE, "output", "removed", Choices(&["vdb"]), or("[\"vdb\"]"))
         .means("removed/removed.%04d.vdb: the snow that each frame removed"),
-    key(GRAINS, "output", "grains", Choices(&["vdb", "ply", "usd"]), or("[\"vdb\"]"))
-        .means("grains/grains.%04d.vdb: points with v, id, active, trapped, pscale, source_frame, rest; also \"ply\", \"usd\""),
+    key(GRAINS, "output", "grains", Choices(&["vdb", "ply", "usd"]), or("[\"vdb\", \"usd\"]"))
+        .means("grains/grains.%04d.vdb: points with v, id, active, trapped, pscale, source_frame, rest; the same as \"usd\", \"ply\""),
     key(GRAINS, "output", "grains_mode", Choice(&["full", "delta"]), or("\"full\""))
         .means("full, or delta: .vdb files of the first and every 24th frame whole, then only changes (`frazil vdb rebuild`)"),
     key(MIST, "output", "mist", Choices(&["vdb"]), or("[\"vdb\"]"))
         .means("mist/mist.%04d.vdb: density, and vel (m/s) at the cells' centres; [] = none"),
+    key(MIST, "output", "mist_half", Flag, or("true")).means("the mist in 16-bit values, as renderers use them; false = 32 bits"),
     key(VOLUMES, "output", "fog", Choices(&["base", "grains", "mist"]), or("[]"))
         .means("fog/fog.%04d.vdb: densities for rendering, a grid for each of these (see docs/snow.md)"),
     key(VOLUMES, "output", "snow", Flag, or("false"))
         .means("snow/snow.%04d.vdb: one level set of the base and the resting grains, on voxels fine enough for the grains (large)"),
-    key(VOLUMES, "output", "mesh", Choices(&["ply", "usd"]), or("[]"))
-        .means("\"ply\", \"usd\": mesh/, the triangulated surface of the base (large)"),
-    key(OBJECTS, "output", "objects", Choices(&["usd", "ply"]), or("[]"))
+    key(VOLUMES, "output", "mesh", Choices(&["usd", "ply"]), optional("[\"usd\"]"))
+        .means("\"usd\", \"ply\": mesh/, the triangulated surface of the base; default: \"usd\" where the base's files are exact"),
+    key(VOLUMES, "output", "mesh_adaptivity", Number(0.0, 1.0, ""), or("0.01"))
+        .means("how far triangles are merged where the mesh is flat; 0 = not at all (6 times the size)"),
+    key(OBJECTS, "output", "objects", Choices(&["usd", "ply"]), or("[\"usd\"]"))
         .means("\"usd\", \"ply\": objects/, the moving objects, with velocities"),
 ];

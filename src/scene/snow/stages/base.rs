@@ -116,7 +116,9 @@ impl Stage for Base<'_> {
             Field::of("touched", Holds::Number),
         ];
         const REMOVED: &[Field] = &[Field::of("removed", Holds::Distance)];
-        let base = Volume { kind: "base", prim: "base", fields: BASE, is_guide: false };
+        // Renderers that draw level sets would draw the snow twice.
+        let has_mesh = self.scene.output.volumes.mesh_usd;
+        let base = Volume { kind: "base", prim: "base", fields: BASE, is_guide: has_mesh };
         let whole = self.scene.output.base_mode == BaseMode::Full;
         let removed = Volume { kind: "removed", prim: "removed", fields: REMOVED, is_guide: true };
         whole.then_some(base).into_iter().chain([removed]).collect()

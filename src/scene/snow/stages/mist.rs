@@ -290,7 +290,8 @@ impl Stepping for Mist<'_> {
             let metadata = metadata(self.scene, files.frame, files.made_from);
             let Grids { density, velocity } = grids;
             let grids = [GridRef::Floats(&density), GridRef::Vectors(&velocity)];
-            let options = WriteOptions { metadata, ..WriteOptions::default() };
+            let options =
+                WriteOptions { metadata, half: self.scene.output.mist_half, ..WriteOptions::default() };
             files.save(NAME, "vdb", &any_to_bytes(&grids, &options)?)?;
             files.describe(NAME, &contents(&[&density]));
         }

@@ -168,7 +168,9 @@ impl<'a> Volumes<'a> {
             files.push(ctx.phase("pack", || Packed::grids("snow", &[&grid], &options))?);
         }
         if self.output.mesh() {
-            let mesh = ctx.phase("mesh", || level_set::to_mesh(ctx, surface, 0.0, 0.0))?;
+            let mesh = ctx.phase("mesh", || {
+                level_set::to_mesh(ctx, surface, 0.0, self.output.mesh_adaptivity as f32)
+            })?;
             results.insert("mesh_triangles".into(), json!(mesh.triangles.len()));
             files.extend(ctx.phase("pack", || self.mesh_files(&mesh, source.frame))?);
         }
