@@ -518,6 +518,23 @@ pub const GATES: &[Gate] = &[
     gate("shallow.lift_discarded", "%", Most(1.0), Most(0.1)),
     gate("shallow.surface_rim", "cells", Most(0.05), Most(0.01)),
     gate("shallow.surface_jump", "cells", Most(0.05), Most(0.01)),
+    // Shots of the demo, made with default settings: the size of a folder over that with the defaults of commit e6ca079 (.ply and .vdb only);
+    // errors of usd-core's validators and NVIDIA's; parts that differ from the reports in usd-core, and in Blender; whether 1 and 2 threads, a
+    // run that was killed, and the folder of an earlier run give the same bytes.
+    gate("files.size", "x", Most(1.2), Most(0.7)),
+    none("files.usd_errors", "errors"),
+    none("files.usd_whole", "parts"),
+    none("files.usd_whole_blender", "parts"),
+    yes("files.same"),
+    // The same shots: the worst factor of the time left that a run says, from a fifth of it on, and of the memory that a check forecasts.
+    // Frames before the 40th that --from 40 makes again where every tenth state is kept.
+    gate("first.eta", "x", Most(2.0), Most(1.3)),
+    gate("first.memory", "x", Most(2.0), Most(1.3)),
+    gate("first.from", "frames", Most(10.0), Open),
+    // Files that differ from one process where OpenJD and Slurm make a shot, with kills and doubled tasks; volumes of 48 frames in four
+    // processes, against one.
+    none("farm.equal", "files"),
+    gate("farm.chunks", "x", Least(1.7), Open),
     // 200 meshes whose parts are turned, doubled or mixed, through every door: wrong without a warning; those that mean one solid, but
     // not right or warned of; right ones that are warned of or refused.
     none("reliability.orientation_silent", "cases"),

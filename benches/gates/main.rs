@@ -12,6 +12,7 @@ mod process;
 mod reliability;
 mod scenes;
 mod shallow;
+mod shots;
 mod snow;
 mod surface;
 mod sweep;
@@ -118,5 +119,6 @@ fn main() {
     surface::rest_kept::run(&mut h);
     surface::detail_kept::run(&mut h);
     h.measure("house.circles", house::circles);
+    shots::run(&mut h);
     h.finish();
 }

@@ -12,6 +12,26 @@ pub struct Drawn<'a> {
     pub triangles: &'a [[u32; 3]],
     /// Texture coordinates, where the file has any.
     pub uvs: Option<&'a Uvs>,
+    /// The parts that it consists of; `None` if the file has no such division.
+    pub parts: Option<&'a Parts>,
+}
+
+/// A division of triangles into parts with names and colours.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Parts {
+    /// The parts, in the file's order.
+    pub list: Vec<Part>,
+    /// For each triangle, the index of its part.
+    pub of_triangles: Vec<u32>,
+}
+
+/// A part of a mesh: what a node of a glTF file shows in one colour.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Part {
+    /// Name of the node.
+    pub name: String,
+    /// Base colour (linear), where the file has one without a texture.
+    pub colour: Option<[f32; 3]>,
 }
 
 /// The faces of a file, and those of its vertices that sweep the snow.
@@ -33,7 +53,7 @@ impl Faces {
 
     /// The mesh as it is written.
     pub fn drawn(&self) -> Drawn<'_> {
-        Drawn { vertices: self.vertices, triangles: &self.triangles, uvs: self.uvs.as_ref() }
+        Drawn { vertices: self.vertices, triangles: &self.triangles, uvs: self.uvs.as_ref(), parts: None }
     }
 
     /// Triangles over the vertices that they use.

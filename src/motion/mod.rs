@@ -9,7 +9,7 @@ mod rigid;
 mod sequence;
 mod space;
 
-pub use drawn::{Drawn, missing_uvs};
+pub use drawn::{Drawn, Part, Parts, missing_uvs};
 pub use gait::{Gait, gait};
 pub use gltf::{Character, Contents, Play};
 pub use morph::Morph;
@@ -55,7 +55,7 @@ pub trait Motion: Send + Sync {
     /// The mesh as its file has it, for output. [`Motion::triangles`], which sweep the snow, may join vertices that always move together,
     /// and omit vertices without a triangle.
     fn drawn(&self) -> Drawn<'_> {
-        Drawn { vertices: self.vertex_count(), triangles: self.triangles(), uvs: None }
+        Drawn { vertices: self.vertex_count(), triangles: self.triangles(), uvs: None, parts: None }
     }
 
     /// As [`Motion::pose`], for the vertices of [`Motion::drawn`].

@@ -260,12 +260,16 @@ pub struct Output {
     pub mist: bool,
     /// Whether its values have 16 bits; `state/` keeps what resuming needs.
     pub mist_half: bool,
+    /// Whether its grids have the names that Blender looks for.
+    pub blender_names: bool,
     /// Volumes to render.
     pub volumes: VolumesOutput,
     /// `objects/objects.%04d.usdc`: the moving objects, with velocities.
     pub objects_usd: bool,
     /// `objects/objects.%04d.ply`: the same, all in one mesh.
     pub objects_ply: bool,
+    /// The exact states of grains and mist that are kept: of every which frame; 0 = only of the last ones.
+    pub keep_states: i32,
     /// `shot.usda`.
     pub usd: bool,
 }

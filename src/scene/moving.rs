@@ -1,10 +1,9 @@
-//! Moving objects: the files of their sequences, and the names of their prims.
+//! Moving objects: the files of their sequences.
 
 use std::path::PathBuf;
 
 use super::Scene;
 use crate::io::files::sequence::Pattern;
-use crate::io::usd;
 
 /// The sequences of the objects that move, each with its offset (frames).
 fn sequences(scene: &Scene) -> impl Iterator<Item = (Pattern, f64)> + '_ {
@@ -27,21 +26,4 @@ pub(super) fn files(scene: &Scene, frame: i32) -> Vec<PathBuf> {
 pub(super) fn files_ahead(scene: &Scene, frame: i32) -> Vec<PathBuf> {
     let number = |offset: f64| (f64::from(frame) + 1.0 - offset).ceil() as i32;
     sequences(scene).map(|(pattern, offset)| pattern.path(number(offset))).collect()
-}
-
-/// Names of the moving objects' prims, each unique.
-pub(super) fn prim_names(scene: &Scene) -> Vec<String> {
-    let mut names: Vec<String> = Vec::new();
-    for object in scene.objects.iter().filter(|object| object.role.moves()) {
-        let stem = object.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let stem =
-            usd::prim_name(stem.split(['%', '#', '$']).next().unwrap_or("").trim_end_matches(['.', '_']));
-        let count =
-            names.iter().filter(|name| **name == stem || name.starts_with(&format!("{stem}_"))).count();
-        let numbered = |number: usize| if number == 1 { stem.clone() } else { format!("{stem}_{number}") };
-        // The numbered name may already belong to another file.
-        let name = (count + 1..).map(numbered).find(|name| !names.contains(name)).unwrap_or_default();
-        names.push(name);
-    }
-    names
 }

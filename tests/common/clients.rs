@@ -125,3 +125,25 @@ pub fn usd_reads_grains(python: &Path, file: &Path, records: &Path, frame: i32) 
     command.arg(root().join("tests/clients/points.py")).arg(file).arg(records).arg(frame.to_string());
     run(command)
 }
+
+/// The Python in which Blender is a module, if there is one.
+pub fn bpy_python() -> Option<PathBuf> {
+    let python = root().join("target/clients-blender/bin/python");
+    python.is_file().then_some(python)
+}
+
+/// Blender imports a shot and finds in it all that the reports of its frames list.
+pub fn blender_is_whole(python: &Path, folder: &Path) -> Result<String, String> {
+    let mut command = Command::new(python);
+    command.arg(root().join("tests/clients/blender_contents.py")).arg(folder);
+    run(command)
+}
+
+/// The script that compares a shot of OpenJD and Slurm with that of one process, if both are installed.
+pub fn farm(program: &Path, folder: &Path) -> Option<Command> {
+    let has_slurm = Path::new("/usr/sbin/slurmd").is_file();
+    let has_openjd = root().join("target/clients/bin/openjd").is_file();
+    let mut command = Command::new("/usr/bin/python3");
+    command.arg(root().join("tests/clients/farm.py")).arg(program).arg(folder);
+    (has_slurm && has_openjd).then_some(command)
+}

@@ -83,6 +83,7 @@ mod scene {
     mod shallow_shot;
     mod shallow_usd;
     mod shallow_volume;
+    mod shot_defaults;
     mod shot_folder;
     mod shot_grain_files;
     mod shot_grain_inputs;

@@ -132,7 +132,6 @@ fn hero() -> String {
     text.push_str(
         "\n[mist]\ncell = 0.02\nfrom_speed = 1.2\nhalf_life = 0.5\nturbulence = 3.0\nturbulence_size = 0.4\n",
     );
-    text.push_str("\n[output]\nobjects = [\"ply\", \"usd\"]\n");
     let last = 1.1 * 71.0 / 24.0;
     let _ = write!(
         text,
@@ -177,7 +176,6 @@ fn plough() -> String {
     text.push_str(
         "noise = { amplitude = 0.004, size = 0.05 }\n\n[grains]\npreset = \"packed\"\ncompression = 0.3\n",
     );
-    text.push_str("\n[output]\nobjects = [\"ply\"]\n");
     object(&mut text, "ball.obj", &two_keys(22, [-0.8, 0.4, 0.0], [0.35, 0.36, 0.0], [0.0; 3]));
     text
 }

@@ -25,6 +25,20 @@ impl Uvs {
         }
     }
 
+    /// Those of some faces of a mesh of triangles, which use these vertices.
+    pub fn of_part(&self, vertices: &[u32], faces: &[usize]) -> Self {
+        match &self.corners {
+            None => {
+                let coordinates = vertices.iter().map(|&vertex| self.coordinates[vertex as usize]).collect();
+                Self { coordinates, corners: None, missing: 0 }
+            }
+            Some(corners) => {
+                let own = faces.iter().flat_map(|face| corners[3 * face..3 * face + 3].iter().copied());
+                Self { coordinates: self.coordinates.clone(), corners: Some(own.collect()), missing: 0 }
+            }
+        }
+    }
+
     /// Coordinates of the corners of faces: for each corner `at` has an index into `coordinates`, or [`NONE`], and `vertices` its vertex. If
     /// all corners of every vertex agree, coordinates are stored by vertex. `None` if no corner has any.
     pub fn of_corners(

@@ -1,5 +1,7 @@
 //! Materials of a USD stage: what renderers show of a shot before it has been shaded.
 
+use std::borrow::Cow;
+
 use super::layer::{Attribute, Prim, Value};
 
 /// Material of a prim.
@@ -10,8 +12,10 @@ pub enum Look {
     /// Snow as a density. USD has no volume shader that all renderers support: the material holds the parameters that the renderers' own
     /// shaders need.
     Fog,
-    /// Objects that move through the snow. A `UsdPreviewSurface`.
+    /// Objects that move. A `UsdPreviewSurface`.
     Object,
+    /// Objects of another colour: the diffuse reflection, linear, in 65535ths. A `UsdPreviewSurface`.
+    Coloured([u16; 3]),
     /// The terrain under a liquid. A `UsdPreviewSurface`.
     Terrain,
     /// The same with stains, in the colours of `displayColor`: Blender draws a mesh without that primvar black.
@@ -28,13 +32,16 @@ pub enum Look {
 
 /// Scope that holds the materials.
 const SCOPE: &str = "materials";
+/// The number of parts of 1 in [`Look::Coloured`].
+const PARTS: f32 = 65535.0;
 /// Roughness of a wet surface.
 const WET: f32 = 0.05;
 
 impl Look {
     /// Name of its material.
-    fn name(self) -> &'static str {
-        match self {
+    fn name(self) -> Cow<'static, str> {
+        let name = match self {
+            Self::Coloured([r, g, b]) => return format!("object_{r:04x}_{g:04x}_{b:04x}").into(),
             Self::Snow => "snow",
             Self::Fog => "fog",
             Self::Object => "object",
@@ -44,7 +51,13 @@ impl Look {
             Self::Blood => "blood",
             Self::Paint => "paint",
             Self::Honey => "honey",
-        }
+        };
+        name.into()
+    }
+
+    /// Objects of a colour (linear, 0 to 1), or of that of objects.
+    pub fn of_object(colour: Option<[f32; 3]>) -> Self {
+        colour.map_or(Self::Object, |colour| Self::Coloured(colour.map(|part| (part * PARTS).round() as u16)))
     }
 
     /// The API schema that a prim with a material needs.
@@ -63,10 +76,10 @@ impl Look {
     fn define(self) -> Prim {
         let name = self.name();
         let path = format!("/shot/{SCOPE}/{name}");
-        let mut material = Prim::def("Material", name);
+        let mut material = Prim::def("Material", &*name);
         let roughness = match self {
             Self::Snow => 0.75,
-            Self::Object => 0.5,
+            Self::Object | Self::Coloured(_) => 0.5,
             Self::Terrain | Self::StainedTerrain => 0.8,
             Self::Paint => 0.3,
             Self::Water | Self::Blood | Self::Honey => WET,
@@ -108,6 +121,7 @@ impl Look {
         match self {
             Self::Snow => [0.9, 0.92, 0.95],
             Self::Object => [0.32, 0.33, 0.36],
+            Self::Coloured(parts) => parts.map(|part| f32::from(part) / PARTS),
             Self::Terrain | Self::StainedTerrain => [0.5, 0.47, 0.43],
             Self::Water => [0.05, 0.25, 0.3],
             Self::Blood => [0.3, 0.008, 0.006],

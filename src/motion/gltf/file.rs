@@ -23,7 +23,9 @@ pub(super) struct File {
     instances: HashMap<usize, Instancing>,
     /// Accessors of zeros, which have no data.
     zeros: HashSet<usize>,
-    /// Whether it has materials, which are not read.
+    /// Base colours of primitives (linear), by the indices of mesh and primitive.
+    pub base_colours: HashMap<(usize, usize), [f32; 3]>,
+    /// Whether it has materials, of which only base colours are read.
     pub has_materials: bool,
     /// Hash of the file and of its buffers.
     pub content: String,
@@ -38,7 +40,16 @@ impl File {
         let bytes = source::read(path)?;
         check_length(&bytes).map_err(|what| Error::file(path, what))?;
         let parsed = json::parse(&bytes).map_err(|what| Error::file(path, what))?;
-        let json::Parsed { document, blob, compressed, fallbacks, instances, zeros, has_materials } = parsed;
+        let json::Parsed {
+            document,
+            blob,
+            compressed,
+            fallbacks,
+            instances,
+            zeros,
+            base_colours,
+            has_materials,
+        } = parsed;
         let folder = path.parent().unwrap_or(Path::new("."));
         // One by one, so that the message can name the buffer at fault.
         let mut blob = blob;
@@ -74,7 +85,7 @@ impl File {
             decoded.insert(view, meshopt::decode(&found, data).map_err(wrong)?);
         }
         let content = content.finish();
-        Ok(Self { document, buffers, decoded, instances, zeros, has_materials, content })
+        Ok(Self { document, buffers, decoded, instances, zeros, base_colours, has_materials, content })
     }
 
     /// The elements of an accessor as rows of `N` numbers; normalised integers become 0..=1 or -1..=1.

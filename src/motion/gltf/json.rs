@@ -32,6 +32,8 @@ pub(super) struct Parsed {
     pub instances: HashMap<usize, Instancing>,
     /// Accessors of zeros, which have no data.
     pub zeros: HashSet<usize>,
+    /// Base colours of primitives, by the indices of mesh and primitive: see [`base_colours`].
+    pub base_colours: HashMap<(usize, usize), [f32; 3]>,
     pub has_materials: bool,
 }
 
@@ -75,11 +77,12 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, String> {
     let fallbacks = fallbacks(&root);
     let instances = instances(&root).map_err(invalid)?;
     let has_materials = !elements(&root, "materials").is_empty();
+    let base_colours = base_colours(&root);
     let zeros = without_data(&mut root);
     point_at_nodes(&mut root);
     reduce(&mut root);
     let document = checked(Value::Object(root)).map_err(invalid)?;
-    Ok(Parsed { document, blob, compressed, fallbacks, instances, zeros, has_materials })
+    Ok(Parsed { document, blob, compressed, fallbacks, instances, zeros, base_colours, has_materials })
 }
 
 /// The JSON and the binary chunk of a .glb; other chunks are for extensions.
@@ -220,6 +223,31 @@ fn point_at_nodes(root: &mut Map<String, Value>) {
             }
         }
     }
+}
+
+/// The base colours (linear) of primitives, by the indices of mesh and primitive. Those with a texture have none: the factor alone would
+/// show another colour.
+fn base_colours(root: &Map<String, Value>) -> HashMap<(usize, usize), [f32; 3]> {
+    let colour_of = |material: &Value| -> Option<[f32; 3]> {
+        let white = [1.0; 3];
+        let Some(parameters) = material.get("pbrMetallicRoughness") else { return Some(white) };
+        if parameters.get("baseColorTexture").is_some() {
+            return None;
+        }
+        let Some(factor) = parameters.get("baseColorFactor") else { return Some(white) };
+        let part = |at: usize| Some(factor.get(at)?.as_f64()?.clamp(0.0, 1.0) as f32);
+        Some([part(0)?, part(1)?, part(2)?])
+    };
+    let colours: Vec<Option<[f32; 3]>> = elements(root, "materials").iter().map(colour_of).collect();
+    let mut out = HashMap::new();
+    for (mesh, value) in elements(root, "meshes").iter().enumerate() {
+        let primitives = value.get("primitives").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
+        for (primitive, value) in primitives.iter().enumerate() {
+            let colour = index(value, "material").and_then(|material| *colours.get(material)?);
+            out.extend(colour.map(|colour| ((mesh, primitive), colour)));
+        }
+    }
+    out
 }
 
 /// Removes everything that moves no vertex.

@@ -96,7 +96,8 @@ impl Character {
         let nodes = nodes::read(&file.document);
         let order = nodes::parents_first(&nodes).ok_or_else(|| wrong("a node is its own ancestor".into()))?;
         let shown = chosen(&file, &nodes, play.node.as_deref()).map_err(wrong)?;
-        let mut vertices = Vertices::read(&file, |node| shown[node]).map_err(wrong)?;
+        let name = |node: usize| nodes[node].name.as_str();
+        let mut vertices = Vertices::read(&file, |node| shown[node], name).map_err(wrong)?;
         if vertices.triangles.is_empty() {
             return Err(wrong("holds no triangles".into()));
         }
@@ -193,9 +194,10 @@ impl Character {
         })
     }
 
-    /// How far a vertex jumps when the clip starts again (the file's unit), if its ends differ.
-    pub fn jump(&self) -> Option<f64> {
-        self.jump
+    /// How far a vertex jumps when the clip starts again (the file's unit), if its ends differ and it starts again between two times (s).
+    pub fn jump(&self, from: f64, to: f64) -> Option<f64> {
+        let round = |time: f64| ((time - self.play.start) / self.duration()).floor();
+        self.jump.filter(|_| round(from) != round(to))
     }
 
     /// Length of the clip (s): from its first key to its last.
@@ -255,7 +257,12 @@ impl Motion for Character {
 
     fn drawn(&self) -> Drawn<'_> {
         let drawn = &self.vertices.drawn;
-        Drawn { vertices: drawn.vertices.len(), triangles: &drawn.triangles, uvs: drawn.uvs.as_ref() }
+        Drawn {
+            vertices: drawn.vertices.len(),
+            triangles: &drawn.triangles,
+            uvs: drawn.uvs.as_ref(),
+            parts: Some(&drawn.parts),
+        }
     }
 
     fn drawn_pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {

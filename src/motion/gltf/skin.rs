@@ -10,6 +10,7 @@ use nalgebra::{Matrix3x4, Matrix4};
 use super::file::File;
 use super::nodes::{Local, matrix4};
 use crate::geometry::{DVec3, Uvs, Vec3};
+use crate::motion::drawn::{self, Parts};
 
 /// A skin: the nodes that move vertices, and their inverse bind matrices.
 struct Skin {
@@ -66,6 +67,10 @@ pub(super) struct FileVertices {
     pub triangles: Vec<[u32; 3]>,
     /// One pair for each vertex, as soon as a primitive has any.
     pub uvs: Option<Uvs>,
+    /// Their division by node and colour.
+    pub parts: Parts,
+    /// The part that triangles are added to.
+    part: usize,
     /// Vertices of the current node that primitives share: their accessors, and where they begin.
     shared: Vec<(Vec<usize>, usize)>,
 }
@@ -75,7 +80,11 @@ impl Vertices {
     ///
     /// # Errors
     /// Numbers that are missing, out of range or not finite.
-    pub fn read(file: &File, wanted: impl Fn(usize) -> bool) -> Result<Self, String> {
+    pub fn read<'a>(
+        file: &File,
+        wanted: impl Fn(usize) -> bool,
+        name: impl Fn(usize) -> &'a str,
+    ) -> Result<Self, String> {
         let mut out = Self::default();
         for skin in file.document.skins() {
             let joints: Vec<usize> = skin.joints().map(|joint| joint.index()).collect();
@@ -118,8 +127,11 @@ impl Vertices {
             };
             out.parts.push(part);
             out.drawn.shared.clear();
+            let first_part = out.drawn.parts.list.len();
             let mut known = HashMap::new();
             for primitive in mesh.primitives() {
+                let colour = file.base_colours.get(&(mesh.index(), primitive.index())).copied();
+                out.drawn.begin_part(first_part, drawn::Part { name: name(node.index()).into(), colour });
                 out.add(file, &primitive, &mut known).map_err(|what| {
                     format!("mesh \"{}\": {what}", mesh.name().or(node.name()).unwrap_or("without a name"))
                 })?;
@@ -298,12 +310,23 @@ impl FileVertices {
         let by = (self.vertices.len() - vertices.start) as u32;
         for at in triangles {
             self.triangles.push(self.triangles[at].map(|vertex| vertex + by));
+            self.parts.of_triangles.push(self.parts.of_triangles[at]);
         }
         if let Some(uvs) = &mut self.uvs {
             uvs.coordinates.extend_from_within(vertices.clone());
         }
         for at in vertices {
             self.vertices.push(self.vertices[at] + shift);
+        }
+    }
+
+    /// Makes a part of the current node the one that triangles are added to; the node's parts begin at `first`.
+    fn begin_part(&mut self, first: usize, part: drawn::Part) {
+        let parts = &mut self.parts;
+        let known = parts.list[first..].iter().position(|known| *known == part);
+        self.part = first + known.unwrap_or(parts.list.len() - first);
+        if known.is_none() {
+            parts.list.push(part);
         }
     }
 
@@ -332,6 +355,7 @@ impl FileVertices {
             }
         };
         self.triangles.extend(triangles.iter().map(|triangle| triangle.map(|index| index + first as u32)));
+        self.parts.of_triangles.resize(self.triangles.len(), self.part as u32);
         Ok(())
     }
 

@@ -93,6 +93,7 @@ impl Cache {
         let mut stored = DoneFrames::read(folder, stage.name())?;
         check_request(stage, request, &stored)?;
         let Request { first, frames, from } = request.for_stage(stage, &stored);
+        let from = if stage.is_outdated(&stored)? { Some(first) } else { from };
         let mut to_remove = Vec::new();
         match from {
             Some(from) if from > first => {

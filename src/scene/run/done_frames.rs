@@ -10,6 +10,9 @@ use crate::error::{Error, Result};
 use crate::io::records::checksummed;
 use crate::io::records::manifest::{Keeps, Manifest, Written};
 
+/// Key of a frame's report: the contents of its files, by kind, then by name of the prim or grid.
+pub(super) const CONTENTS: &str = "contents";
+
 /// The frames of a stage that are done in a folder, with their records.
 pub struct DoneFrames {
     folder: PathBuf,
@@ -144,6 +147,15 @@ impl DoneFrames {
         };
         let report = serde_json::from_slice(&bytes).ok().filter(|_| checksummed::is_stamped(&bytes));
         report.map(Some).ok_or_else(|| Error::file(path, "is not the report that was written"))
+    }
+
+    /// The contents of a frame's files of a kind, by prim or grid, from the frame's report. `None` if it has none, as in reports of frazil 0.1.
+    ///
+    /// # Errors
+    /// As [`DoneFrames::report`].
+    pub fn contents(&self, frame: i32, kind: &str) -> Result<Option<Value>> {
+        let report = self.report(frame)?;
+        Ok(report.and_then(|report| Some(report.get(CONTENTS)?.get(kind)?.clone())))
     }
 
     /// The file with the state after a frame, or with the frame's changes; its content is verified.

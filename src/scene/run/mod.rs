@@ -9,6 +9,7 @@
 mod cache;
 mod chain;
 mod done_frames;
+mod going_back;
 mod own_files;
 mod pass;
 mod pipeline;

@@ -9,8 +9,8 @@ use serde_json::{Map, Value, json};
 
 use super::cache::Cache;
 use super::chain::FrameHashes;
-use super::done_frames::{DoneFrames, Resumable};
-use super::stage::{CONTENTS, FrameFiles, Report, Stage, StepTarget, Stepped, Stepping};
+use super::done_frames::{CONTENTS, DoneFrames, Resumable};
+use super::stage::{FrameFiles, Report, Stage, StepTarget, Stepped, Stepping};
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
 use crate::io::files::atomic;
@@ -88,8 +88,8 @@ pub struct Work<'a> {
     pub upstream: &'a [DoneFrames],
     /// The frames to make, ascending.
     pub todo: &'a [i32],
-    /// Whether the exact states of all frames are kept, as the stage or another one requires.
-    pub every_state: bool,
+    /// The exact states that are kept: of every which frame, from the first on; 0 = only of the last ones.
+    pub states_every: i32,
 }
 
 /// A stage with its state after a frame.
@@ -169,8 +169,8 @@ impl<'a, S: Stepping> StagePass<'a, S> {
 impl<S: Stepping> Pass for StagePass<'_, S> {
     fn make(self: Box<Self>, mut work: Work<'_>) -> Result<()> {
         let folder = work.cache.stored.folder().to_path_buf();
-        let Work { shared, every_state, .. } = work;
-        let writer = FrameWriter { stage: self.stage, folder: &folder, first: shared.first, every_state };
+        let Work { shared, states_every, .. } = work;
+        let writer = FrameWriter { stage: self.stage, folder: &folder, first: shared.first, states_every };
         let (jobs, waiting) = sync_channel(MAX_WAITING);
         let (made, finished) = std::thread::scope(|scope| {
             let writing = scope.spawn(|| writer.write_all(waiting, shared.on_done));
@@ -190,8 +190,8 @@ struct FrameWriter<'a, S> {
     stage: &'a S,
     folder: &'a Path,
     first: i32,
-    /// Whether the exact states of all frames are kept, as the stage or another one requires.
-    every_state: bool,
+    /// As in [`Work`].
+    states_every: i32,
 }
 
 impl<S: Stepping> FrameWriter<'_, S> {
@@ -249,7 +249,7 @@ impl<S: Stepping> FrameWriter<'_, S> {
         let keeps = self.stage.keeps(frame);
         let manifest = Manifest { frame, inputs: hashes.inputs, keeps, files, state, next: hashes.next };
         manifest.write(self.folder, self.stage.name())?;
-        if keeps == Keeps::State && !self.every_state {
+        if keeps == Keeps::State && self.states_every != 1 {
             self.remove_states_before(frame);
         }
         on_done(self.stage.name(), frame, &report);
@@ -260,7 +260,9 @@ impl<S: Stepping> FrameWriter<'_, S> {
     fn remove_states_before(&self, frame: i32) {
         let (stage, extension) = (self.stage.name(), self.stage.state_extension());
         let path = |old: i32| self.folder.join("state").join(format!("{stage}.{old:04}.{extension}"));
-        let mut passed = (self.first..=frame - STATES_KEPT).rev();
+        let every = i64::from(self.states_every);
+        let is_kept = |old: &i32| every > 0 && (i64::from(*old) - i64::from(self.first)) % every == 0;
+        let mut passed = (self.first..=frame - STATES_KEPT).rev().filter(|old| !is_kept(old));
         while passed.next().is_some_and(|old| std::fs::remove_file(path(old)).is_ok()) {}
     }
 

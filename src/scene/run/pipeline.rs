@@ -69,10 +69,11 @@ impl Pipeline<'_> {
         Ok(())
     }
 
-    /// Whether the exact states of all frames of a stage are kept, because it requires that or another stage reads them.
-    pub(super) fn keeps_states_of(&self, of: &dyn Stage) -> bool {
+    /// The exact states of a stage that are kept: of every which frame, from the first on; 0 = only of the last ones. All are, if the stage
+    /// requires that or another one reads them.
+    pub(super) fn states_kept_every(&self, of: &dyn Stage) -> i32 {
         let reads =
             |stage: &dyn Stage| stage.upstream().contains(&of.name()) && stage.reads_state_of(of.name());
-        of.keeps_every_state() || self.stages().any(reads)
+        if of.keeps_every_state() || self.stages().any(reads) { 1 } else { self.scene.output.keep_states }
     }
 }

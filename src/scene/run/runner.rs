@@ -8,6 +8,7 @@ use std::thread::ScopedJoinHandle;
 
 use super::cache::{Cache, Request, check_request};
 use super::done_frames::DoneFrames;
+use super::going_back::resumable_from;
 use super::own_files::OwnFiles;
 use super::pass::{AnyStage, Pass, Shared, Work};
 use super::pipeline::Pipeline;
@@ -73,6 +74,8 @@ impl<'a> Run<'a> {
         from: Option<i32>,
     ) -> Result<Self> {
         let chosen = pipeline.chosen(only)?;
+        let asked = from;
+        let from = asked.map(|from| going_back(pipeline, &chosen, folder, from)).transpose()?;
         let request = Request { first: pipeline.scene.shot.frames.first, frames, from };
         // Checked before the folder is created, so that a refused run leaves none behind, and again once no other run can write into it.
         let of_run = || chosen.iter().map(|position| &*pipeline.stages[*position] as &dyn Stage);
@@ -87,6 +90,14 @@ impl<'a> Run<'a> {
         own.remove_unfinished()?;
         own.refuse_foreign(pipeline, frames)?;
         pipeline.refuse_stale(&chosen, folder)?;
+        if let (Some(asked), Some(from)) = (asked, from)
+            && from < asked
+        {
+            log::warn!(
+                "--from {asked} goes back to frame {from}: the folder keeps no exact state after frame {}",
+                asked - 1
+            );
+        }
         let mut run = Self { pipeline, stages: Vec::new(), own, is_chunk: false, _lock: lock };
         let downstream = if from.is_some() { pipeline.downstream(&chosen) } else { Vec::new() };
         for (position, stage) in pipeline.stages.iter().enumerate() {
@@ -336,10 +347,10 @@ impl<'a> Run<'a> {
             let threads: Vec<_> = runs
                 .zip(&upstream)
                 .map(|((_, run), upstream)| {
-                    let every_state = pipeline.keeps_states_of(run.stage);
+                    let states_every = pipeline.states_kept_every(run.stage);
                     scope.spawn(move || {
                         let stop = StopOthers(shared.stop);
-                        let result = run.make(&shared, upstream, every_state);
+                        let result = run.make(&shared, upstream, states_every);
                         if !matches!(result, Err(Error::Cancelled)) {
                             std::mem::forget(stop);
                         }
@@ -364,7 +375,7 @@ impl Drop for StopOthers<'_> {
 }
 
 impl StageRun<'_> {
-    fn make(&mut self, shared: &Shared<'_>, upstream: &[DoneFrames], every_state: bool) -> Result<()> {
+    fn make(&mut self, shared: &Shared<'_>, upstream: &[DoneFrames], states_every: i32) -> Result<()> {
         let todo = std::mem::take(&mut self.todo);
         let Some(cache) = &mut self.cache else { return Ok(()) };
         let start = match self.start.take() {
@@ -376,8 +387,18 @@ impl StageRun<'_> {
                 self.stage.start_pass(shared.ctx, todo[0], cache.resumable(shared.first))?
             }
         };
-        start.make(Work { shared, cache, upstream, todo: &todo, every_state })
+        start.make(Work { shared, cache, upstream, todo: &todo, states_every })
     }
+}
+
+/// The frame from which the chosen stages of a folder are made again.
+fn going_back(pipeline: &Pipeline, chosen: &[usize], folder: &Path, from: i32) -> Result<i32> {
+    let done = |position: &usize| {
+        let stage: &dyn Stage = &*pipeline.stages[*position];
+        Ok((stage, DoneFrames::read(folder, stage.name())?))
+    };
+    let stages: Vec<_> = chosen.iter().map(done).collect::<Result<_>>()?;
+    Ok(resumable_from(&stages, from, pipeline.scene.output.keep_states))
 }
 
 fn make_folders<'s>(stages: impl Iterator<Item = &'s dyn Stage>, folder: &Path) -> Result<()> {

@@ -44,7 +44,7 @@ pub trait Stage: Sync {
 
     /// Why a folder may lack the exact state after a frame, for messages: which states are kept.
     fn why_states_are_missing(&self) -> &'static str {
-        "state/ keeps those of the last two frames"
+        "state/ keeps those of the last two frames; `output.keep_states` keeps more"
     }
 
     /// Its kinds of files. With [`Keeps::Whole`] or [`Keeps::Changes`], the kind with the stage's own name holds the state.
@@ -89,6 +89,14 @@ pub trait Stage: Sync {
     /// Whether it reads the exact states of an upstream stage, not only its files: the states of all frames are then kept.
     fn reads_state_of(&self, _upstream: &str) -> bool {
         true
+    }
+
+    /// Whether its frames were written in another way by an earlier version, so that they must be made again.
+    ///
+    /// # Errors
+    /// A damaged report.
+    fn is_outdated(&self, _done: &DoneFrames) -> Result<bool> {
+        Ok(false)
     }
 
     /// Whether a frame depends on the frames before it.
@@ -222,9 +230,6 @@ impl Report {
         Self { results, phases }
     }
 }
-
-/// Key of a frame's report: the contents of its files, by kind, then by name of the prim or grid.
-pub(super) const CONTENTS: &str = "contents";
 
 /// The files of a frame while they are being written.
 pub struct FrameFiles<'a> {

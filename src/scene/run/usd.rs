@@ -5,7 +5,7 @@ use std::path::Path;
 use super::done_frames::DoneFrames;
 use super::own_files::{OwnFiles, SHOT_USD};
 use super::pipeline::Pipeline;
-use super::stage::{CONTENTS, Stage, Volume};
+use super::stage::{Stage, Volume};
 use crate::context::Context;
 use crate::error::Result;
 use crate::io::mesh::extension;
@@ -66,10 +66,9 @@ fn volume_file(
     path: String,
 ) -> VolumeFile {
     type Box = [[f32; 3]; 2];
-    let report = stored.report(frame).ok().flatten().unwrap_or_default();
-    let grids = report.get(CONTENTS).and_then(|contents| contents.get(kind));
+    let grids = stored.contents(frame, kind).ok().flatten();
     let visible = fields.iter().filter(|field| matches!(field.holds, Holds::Distance | Holds::Density(_)));
-    let extent = |field: &Field| grids?.get(field.grid)?.get("extent_m").cloned();
+    let extent = |field: &Field| grids.as_ref()?.get(field.grid)?.get("extent_m").cloned();
     let known: Vec<serde_json::Value> = visible.filter_map(extent).collect();
     let boxes = known.iter().filter_map(|extent| serde_json::from_value::<Box>(extent.clone()).ok());
     let joined = boxes.reduce(|[low, high], [l, h]| {

@@ -409,7 +409,8 @@ fn character(scene: &Scene, object: &Object, input_hashes: &InputHashes) -> Resu
     };
     let character = Character::open(&object.file, play)?;
     input_hashes.record(&object.file, character.content().to_string())?;
-    if let Some(jump) = character.jump() {
+    let [from, to] = [scene.shot.frames.first, scene.shot.frames.last].map(|frame| scene.shot.time(frame));
+    if let Some(jump) = character.jump(from, to) {
         let metres = jump * object.space.scale;
         log::warn!(
             "{}: the clip does not end as it begins: each round starts with a jump of {metres:.3} m",

@@ -52,6 +52,7 @@ impl Output {
             grains_delta: is_delta("grains_mode"),
             mist: output.holds("mist", "vdb"),
             mist_half: is_on("mist_half"),
+            blender_names: output.text("names") == Some("blender"),
             volumes: VolumesOutput {
                 fog_base: output.holds("fog", "base"),
                 fog_grains: output.holds("fog", "grains"),
@@ -63,6 +64,7 @@ impl Output {
             },
             objects_usd: output.holds("objects", "usd"),
             objects_ply: output.holds("objects", "ply"),
+            keep_states: output.find("keep_states").unwrap_or_default(),
             usd: is_on("usd"),
         };
         // By default, the mesh is written where it can be made: other systems write no base.

@@ -121,12 +121,28 @@ impl FlowPoint {
         self.validate()?;
         let mut found = Vec::new();
         self.find_columns(columns, &mut found);
-        if found.is_empty() { Err(self.nowhere()) } else { Ok(found) }
+        if found.is_empty() { Err(self.nowhere(columns)) } else { Ok(found) }
     }
 
-    fn nowhere(&self) -> Error {
+    /// The error for a point without a column. It names the nearest ground.
+    fn nowhere(&self, columns: &Columns) -> Error {
         let [x, y, z] = self.at;
-        Error::argument(format!("at ({x}, {y}, {z}) there is only solid, or it lies outside of the domain"))
+        let ground = self.nearest_ground(columns).map(|at| at.map(|part| (part * 1e6).round() / 1e6));
+        let ground =
+            ground.map_or(String::new(), |[x, y, z]| format!("; the nearest ground is at ({x}, {y}, {z})"));
+        Error::argument(format!(
+            "at ({x}, {y}, {z}) there is only solid, or it lies outside of the domain{ground}"
+        ))
+    }
+
+    /// The base of the column that is nearest to it (m); `None` without columns.
+    fn nearest_ground(&self, columns: &Columns) -> Option<[f64; 3]> {
+        let ground = |index: usize| {
+            let [x, z] = columns.grid.centre(columns.cell(index));
+            [x, columns.heights.metres(columns.bases()[index]), z]
+        };
+        let distance = |at: &[f64; 3]| (0..3).map(|axis| (at[axis] - self.at[axis]).powi(2)).sum::<f64>();
+        columns.indices().map(ground).min_by(|a, b| distance(a).total_cmp(&distance(b)))
     }
 
     /// Lists the columns in its circle: in each cell the one that contains the centre, or is nearest to it.
@@ -170,7 +186,7 @@ impl Flows {
     ) -> Result<()> {
         let placed = placed(columns, points, &which)?;
         if let Some(at) = placed.iter().position(|placed| placed.columns.is_empty()) {
-            return Err(Error::argument(format!("{}: {}", which(at), points[at].nowhere())));
+            return Err(Error::argument(format!("{}: {}", which(at), points[at].nowhere(columns))));
         }
         self.placed = placed;
         Ok(())

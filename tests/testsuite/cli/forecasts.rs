@@ -105,7 +105,7 @@ fn before_mist_is_made_the_boxes_of_objects_are_filled_with_it() {
     let tiles = |along: u64| 4 * 5 * along * 512;
     assert_eq!(mist["cells"], tiles(6));
     let states = 2 * 40 * tiles(6);
-    assert_eq!(mist["disk_bytes"], 16 * tiles(4 + 6 * 5 + 3 * 6) + states);
+    assert_eq!(mist["disk_bytes"], 8 * tiles(4 + 6 * 5 + 3 * 6) + states);
     assert_eq!(number(mist, "memory_bytes"), number(mist, "cells") * number(mist, "memory_bytes_per_cell"));
     assert!((number(mist, "air_m3") / (20.0 * 6.0 * 0.24f64.powi(3)) - 1.0).abs() < 1e-9, "{mist}");
     let cells = |options: &str| number(&report(folder, options)["mist"], "cells");
@@ -114,7 +114,11 @@ fn before_mist_is_made_the_boxes_of_objects_are_filled_with_it() {
     assert_eq!(cells("--set object.1.role=base"), 0.0, "what pushes no grains raises none");
     // Fog holds the density once more, and what is not written takes no space but for states.
     let disk = |options: &str| number(&report(folder, options)["mist"], "disk_bytes") as u64 - states;
-    assert_eq!(4 * disk("--set output.fog=[\"mist\"]"), 5 * disk(""));
+    assert_eq!(2 * disk("--set output.fog=[\"mist\"]"), 3 * disk(""));
+    assert_eq!(disk("--set output.mist_half=false"), 2 * disk(""));
+    let kept = |every: i32| disk(&format!("--set output.keep_states={every}")) - disk("");
+    // The frames after the first hold more.
+    assert!(kept(1) > 10 * kept(10) && kept(10) == 40 * tiles(4), "{} {}", kept(1), kept(10));
     assert_eq!(disk("--set output.mist=[]"), 0);
     let text = works(folder, "check shot.toml --max-memory 11M");
     for words in

@@ -27,7 +27,7 @@ fn removed(folder: &Path, frame: u32) -> f64 {
 #[test]
 fn a_scene_makes_frames_and_its_resolved_file_makes_them_again() {
     let folder = folder(3, 0.05, CUBE);
-    let said = works(&folder, "snow shot.toml -o out");
+    let said = works(&folder, "snow shot.toml -o out --stage base");
     assert!(said.contains("frame 3 stage base 100% eta 00:00:00"), "{said}");
     assert!(removed(&folder, 1) > 0.4 * 0.4 * 0.2 * 0.8);
     works(&folder, "snow out/scene.toml -o again -q --threads 1");
@@ -47,10 +47,11 @@ fn a_scene_makes_frames_and_its_resolved_file_makes_them_again() {
 #[test]
 fn progress_is_a_line_of_json_for_each_frame() {
     let folder = folder(3, 0.05, CUBE);
-    let said = works(&folder, "snow shot.toml -o out --progress json --set output.objects=[\"usd\"]");
+    let said = works(&folder, "snow shot.toml -o out --progress json");
     let lines: Vec<serde_json::Value> =
         said.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
-    assert_eq!(lines.len(), 6, "{said}");
+    // Of the base, its mesh and the objects.
+    assert_eq!(lines.len(), 9, "{said}");
     let of_base: Vec<i64> = lines
         .iter()
         .filter(|line| line["stage"] == "base")

@@ -170,7 +170,7 @@ fn what_is_wrong_is_one_sentence_and_leaves_nothing_behind() {
     with("[[source]]\nat = [0, 0, 0]\nradius = 0\n", &["spill.toml:7", "`rate_ml` in [[source]] is missing"]);
     with(
         "[[source]]\nat = [0, 0.5, 0]\nradius = 0\nrate_ml = 1\n",
-        &["source.1", "only solid, or it lies outside"],
+        &["source.1", "only solid, or it lies outside", "the nearest ground is at ("],
     );
     with("[[drain]]\nat = [3, 0, 0]\nradius = 1\nrate_ml = 1\n", &["drain.1"]);
     let drain = "[[drain]]\nat = [0, 0, 0]\nradius = 0\nrate_ml = 1\n";

@@ -49,7 +49,9 @@ fn a_new_scene_lacks_nothing_but_its_character() {
             _ => line.to_string(),
         })
         .filter(|line| {
-            !["top =", "node =", "clip =", "loop =", "compression ="].iter().any(|key| line.starts_with(key))
+            !["top =", "node =", "clip =", "loop =", "compression =", "mesh ="]
+                .iter()
+                .any(|key| line.starts_with(key))
         })
         .collect();
     fs::write(folder.join("all.toml"), all.join("\n")).unwrap();

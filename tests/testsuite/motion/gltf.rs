@@ -146,7 +146,7 @@ fn clips_start_where_they_are_asked_to_and_repeat() {
     let path = maker.write(&folder);
     let play = Play { start: 10.0, ..Play::default() };
     let character = Character::open(&path, play.clone()).unwrap();
-    assert_eq!((character.duration(), character.jump()), (2.0, None));
+    assert_eq!((character.duration(), character.jump(0.0, 10.0)), (2.0, None));
     for (time, x) in [(10.0, 0.0), (10.5, 0.5), (11.0, 1.0), (12.0, 0.0), (12.25, 0.25), (9.5, 0.5)] {
         close(pose(&character, time)[0], [x, 0.0, 0.0]);
     }
@@ -164,7 +164,7 @@ fn a_round_that_does_not_close_says_so_and_jumps_at_once() {
     maker.clip("walk");
     maker.channel(0, "translation", "LINEAR", &[0., 1.], &[0., 0., 0., 3., 0., 0.]);
     let character = Character::open(&maker.write(&folder), Play::default()).unwrap();
-    assert!((character.jump().unwrap() - 3.0).abs() < 1e-6);
+    assert!((character.jump(0.0, 10.0).unwrap() - 3.0).abs() < 1e-6);
     let breaks = character.breaks(0.5, 1.5);
     assert_eq!(breaks.len(), 2, "{breaks:?}");
     assert!(pose(&character, breaks[0])[0].x > 2.99 && pose(&character, breaks[1] + 1e-9)[0].x < 0.01);
@@ -270,7 +270,7 @@ fn the_foot_that_stands_does_not_slip_when_keys_carry_the_figure_at_its_speed() 
     fs::write(&path, hero::glb()).unwrap();
     let play = Play { clip: Some("walk".into()), ..Play::default() };
     let inner = Character::open(&path, play).unwrap();
-    assert_eq!(inner.jump(), None);
+    assert_eq!(inner.jump(0.0, 10.0), None);
     let key = |time: f64| Key { time, at: DVec3::z() * f64::from(hero::SPEED) * time, turn: DVec3::zeros() };
     let keys = Keys::new(vec![key(0.0), key(4.0)]).unwrap();
     let walker = Placed::new(Box::new(inner), Space::OWN, keys);

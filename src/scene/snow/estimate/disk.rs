@@ -32,8 +32,6 @@ const FOG_SHARE: f64 = 0.3;
 /// Bytes for each column of cells in a mesh of the base.
 const MESH_PLY: f64 = 90.0;
 const MESH_USD: f64 = 65.0;
-/// Number of states of grains that are kept.
-const STATES: f64 = 2.0;
 
 /// Estimates the disk space of grains' files and states (bytes), from the count of grains after each frame.
 pub(in crate::scene::snow) fn of_grains(scene: &Scene, counts: &[f64]) -> u64 {
@@ -50,8 +48,16 @@ pub(in crate::scene::snow) fn of_grains(scene: &Scene, counts: &[f64]) -> u64 {
             + f64::from(output.volumes.snow) * GRAIN_UNITED
     };
     let files: f64 = counts.iter().enumerate().map(|(frame, grains)| grains * each(frame)).sum();
-    let max = counts.iter().copied().fold(0.0, f64::max);
-    (files + STATES * max * GRAIN_STATE) as u64
+    (files + states_kept(scene, counts) * GRAIN_STATE) as u64
+}
+
+/// Sum of the amounts (grains or cells) in the states that are kept, from those after each frame: the last two, here the largest ones, and
+/// every Nth.
+pub(super) fn states_kept(scene: &Scene, amounts: &[f64]) -> f64 {
+    const LAST: f64 = 2.0;
+    let every = scene.output.keep_states as usize;
+    let kept: f64 = if every == 0 { 0.0 } else { amounts.iter().step_by(every).sum() };
+    kept + LAST * amounts.iter().copied().fold(0.0, f64::max)
 }
 
 /// Estimates the disk space of all files (bytes) except those of grains.

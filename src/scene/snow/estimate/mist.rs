@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::scene::Scene;
 use crate::scene::run::DoneFrames;
+use crate::scene::snow::estimate::disk::states_kept;
 use crate::scene::snow::inspect::object_path::ObjectPath;
 use crate::scene::snow::keys::mist::mist_params;
 use crate::snow::mist::{self, MIN_DENSITY, Params};
@@ -22,12 +23,12 @@ const CELLS: u64 = 512;
 /// Bytes of a cell while a frame is written and the next one made: a copy of velocity, pressure and density with their neighbours (40);
 /// density and velocity as blocks, as grids and as a file (16 each).
 const BYTES_WRITING: u64 = 40 + 3 * 16;
-/// Bytes of a cell in mist/ (density and velocity), and in fog/: 32-bit floats, which hardly compress.
+/// Bytes of a cell in mist/ (density and velocity) in 32 and in 16 bits, and in fog/, in 32 bits: they hardly compress.
 const BYTES_IN_MIST: u64 = 16;
+const BYTES_IN_HALF_MIST: u64 = 8;
 const BYTES_IN_FOG: u64 = 4;
-/// Bytes of a cell in an exact state, and number of states kept.
+/// Bytes of a cell in an exact state.
 const BYTES_IN_STATE: u64 = 40;
-const STATES: u64 = 2;
 /// Maximum count of cubes (of one tile) in a box: for larger boxes the cubes are larger.
 const MAX_CUBES: f64 = 4096.0;
 /// Maximum count of intervals that a shot is divided into: in longer shots an interval has several frames.
@@ -70,16 +71,18 @@ impl MistForecast {
         let Some(params) = mist_params(&scene.values) else { return Ok(None) };
         let last = scene.shot.frames.last;
         let existing = stored.map(|stored| existing_cells(stored, params.cell, last)).transpose()?.flatten();
-        // The maximum number of cells at one time, and the sum over all frames.
-        let (max, total) = match existing {
-            Some((_, cells)) => (cells, cells * scene.shot.frames.count() as f64),
-            None => {
-                let of_frames = cells_in_boxes(ctx, scene, paths, &params)?;
-                (of_frames.iter().copied().fold(0.0, f64::max), of_frames.iter().sum())
-            }
+        let of_frames = match existing {
+            Some((_, cells)) => vec![cells; scene.shot.frames.count() as usize],
+            None => cells_in_boxes(ctx, scene, paths, &params)?,
         };
+        // The maximum number of cells at one time, and the sum over all frames.
+        let (max, total) = (of_frames.iter().copied().fold(0.0, f64::max), of_frames.iter().sum::<f64>());
         let output = scene.output;
-        let in_mist = if output.mist { BYTES_IN_MIST } else { 0 };
+        let in_mist = match (output.mist, output.mist_half) {
+            (false, _) => 0,
+            (true, true) => BYTES_IN_HALF_MIST,
+            (true, false) => BYTES_IN_MIST,
+        };
         let in_fog = if output.volumes.fog_mist { BYTES_IN_FOG } else { 0 };
         let [step, in_files] = [mist::memory(1) / CELLS, in_mist + in_fog];
         let cells = max.ceil() as u64;
@@ -93,7 +96,7 @@ impl MistForecast {
             air_m3: max * params.cell.powi(3),
             memory_bytes: cells.saturating_mul(step + BYTES_WRITING),
             disk_bytes: ((total * in_files as f64) as u64)
-                .saturating_add(cells.saturating_mul(STATES * BYTES_IN_STATE)),
+                .saturating_add((states_kept(scene, &of_frames) * BYTES_IN_STATE as f64) as u64),
         }))
     }
 

@@ -101,7 +101,7 @@ impl<'a> ObjectPath<'a> {
             self.out_of_reach(ctx)?,
             self.rotates_too_far(),
             self.jumping(report),
-            self.other_unit(),
+            self.other_unit().or_else(|| self.other_height(report)),
             self.untouched(report),
             self.inside_out(),
             self.below_ground(report),
@@ -213,6 +213,18 @@ impl<'a> ObjectPath<'a> {
         Some(format!("{} is {tallest:.3} m large: scale = {scale}?", self.name))
     }
 
+    /// The height of a figure that walks, if it is that of no person.
+    fn other_height(&self, report: &ObjectReport) -> Option<String> {
+        report.walk.as_ref()?;
+        let tall = report.size_m[1];
+        let factor = likely_scale_of_figure(tall)?;
+        let scale = rounded(self.object.space.scale * factor);
+        Some(format!(
+            "{} walks and is {tall:.3} m tall: scale = {scale} makes it as tall as a person ({PERSON} m)",
+            self.name
+        ))
+    }
+
     /// That it never touches the snow, and on which side it stays.
     fn untouched(&self, report: &ObjectReport) -> Option<String> {
         let (area, top) = self.inputs.area().zip(self.inputs.top()).filter(|_| report.touches.is_none())?;
@@ -316,6 +328,21 @@ fn likely_scale(size: f64) -> Option<f64> {
     }
 }
 
+/// Height of a person (m), and of the shortest and the tallest figure that is taken for one.
+const PERSON: f64 = 1.7;
+const HEIGHTS: [f64; 2] = [0.8, 2.5];
+
+/// The scale factor that makes a figure that walks as tall as a person, if it is not about so already.
+fn likely_scale_of_figure(height: f64) -> Option<f64> {
+    let is_plausible = (HEIGHTS[0]..=HEIGHTS[1]).contains(&height);
+    (!is_plausible && height > 0.0).then_some(PERSON / height)
+}
+
+/// A factor rounded to three significant digits.
+fn rounded(factor: f64) -> f64 {
+    format!("{factor:.2e}").parse().unwrap_or(factor)
+}
+
 /// The lowest position of an object relative to the ground.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Deepest {
@@ -371,5 +398,13 @@ mod tests {
         assert_eq!(likely_scale(1.72), None);
         assert_eq!(likely_scale(0.0172), Some(100.0));
         assert_eq!(likely_scale(1e6), None);
+    }
+
+    #[test]
+    fn figures_that_walk_are_as_tall_as_people() {
+        // The robot of RobotExpressive.glb is 4.4 m tall.
+        assert_eq!(likely_scale_of_figure(4.4).map(rounded), Some(0.386));
+        assert_eq!(likely_scale_of_figure(0.4).map(rounded), Some(4.25));
+        assert_eq!([0.8, 1.7, 2.5].map(likely_scale_of_figure), [None; 3]);
     }
 }

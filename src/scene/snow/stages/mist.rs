@@ -30,6 +30,8 @@ use crate::vdb::{FloatGrid, GridRef};
 const NAME: &str = "mist";
 /// Name of the grid of densities in its files.
 const DENSITY: &str = "density";
+/// Names of the grid of velocities that Houdini and Blender look for.
+const VELOCITY: [&str; 2] = ["vel", "velocity"];
 
 /// The stage for a scene.
 pub struct Mist<'a> {
@@ -234,8 +236,13 @@ impl Stage for Mist<'_> {
     }
 
     fn volumes(&self) -> Vec<Volume> {
-        const FIELDS: &[Field] = &[Field::of(DENSITY, Holds::Density(1.0)), Field::of("vel", Holds::Vector)];
-        vec![Volume { kind: NAME, prim: NAME, fields: FIELDS, is_guide: false }]
+        const fn fields(velocity: &'static str) -> [Field; 2] {
+            [Field::of(DENSITY, Holds::Density(1.0)), Field::of(velocity, Holds::Vector)]
+        }
+        const OF_HOUDINI: &[Field] = &fields(VELOCITY[0]);
+        const OF_BLENDER: &[Field] = &fields(VELOCITY[1]);
+        let fields = if self.scene.output.blender_names { OF_BLENDER } else { OF_HOUDINI };
+        vec![Volume { kind: NAME, prim: NAME, fields, is_guide: false }]
     }
 }
 
@@ -286,9 +293,9 @@ impl Stepping for Mist<'_> {
     fn write(&self, ctx: &mut Context, step: Self::Step, files: Option<&mut FrameFiles>) -> Result<()> {
         let (Some(mist), Some(files)) = (step, files) else { return Ok(()) };
         if self.scene.output.mist {
-            let grids = Grids::of(ctx, &mist)?;
+            let Grids { density, mut velocity } = Grids::of(ctx, &mist)?;
+            velocity.set_name(VELOCITY[usize::from(self.scene.output.blender_names)])?;
             let metadata = metadata(self.scene, files.frame, files.made_from);
-            let Grids { density, velocity } = grids;
             let grids = [GridRef::Floats(&density), GridRef::Vectors(&velocity)];
             let options =
                 WriteOptions { metadata, half: self.scene.output.mist_half, ..WriteOptions::default() };

@@ -1,5 +1,7 @@
 //! The stage `objects`: the objects as they move, with their velocities over the coming frame.
 
+mod prims;
+
 use std::sync::Arc;
 
 use super::run::{
@@ -11,19 +13,20 @@ use crate::error::Result;
 use crate::geometry::{DVec3, TriMesh, Uvs, Vec3};
 use crate::io::records::input_hashes::InputHashes;
 use crate::io::records::manifest::Keeps;
-use crate::io::usd::materials::Look;
-use crate::io::usd::{ClipPrims, Clips, MeshPrim, Shading};
+use crate::io::usd::{ClipPrims, Clips};
 use crate::io::{mesh, usd};
 use crate::motion::Drawn;
 use crate::scene::run::settings::settings_of;
 use crate::sweep::Body;
+use prims::{ObjectPrim, prims_of};
 
 /// The moving objects of a scene.
 pub struct Objects<'a> {
     scene: &'a Scene,
     bodies: &'a [Body],
     input_hashes: &'a Arc<InputHashes>,
-    names: Vec<String>,
+    /// The prims of each object.
+    prims: Vec<Vec<ObjectPrim>>,
 }
 
 /// The objects at a frame: positions (m) and velocities (m/s) of their vertices.
@@ -35,7 +38,8 @@ pub struct Poses {
 impl<'a> Objects<'a> {
     /// The objects of a scene; `bodies` are in its order.
     pub fn new(scene: &'a Scene, bodies: &'a [Body], input_hashes: &'a Arc<InputHashes>) -> Self {
-        Self { scene, bodies, input_hashes, names: moving::prim_names(scene) }
+        let drawn = bodies.iter().map(|body| body.motion().drawn());
+        Self { scene, bodies, input_hashes, prims: prims_of(scene, drawn) }
     }
 
     /// All objects in one mesh.
@@ -50,20 +54,15 @@ impl<'a> Objects<'a> {
         mesh::ply_bytes(&all, &carried)
     }
 
-    /// A value clip with a mesh for each object.
-    fn usd(&self, poses: &Poses, drawn: &[Drawn<'_>]) -> usd::File {
-        let frames = poses.meshes.iter().zip(drawn.iter().zip(&self.names));
-        let frames: Vec<usd::MeshFrame> = frames
-            .map(|((points, velocities), (drawn, name))| usd::MeshFrame {
-                name,
-                points,
-                velocities,
-                triangles: drawn.triangles,
-                uvs: drawn.uvs,
-                arrays: &[],
-                shading: Shading::Creased,
-            })
-            .collect();
+    /// A value clip with a mesh for each prim.
+    fn usd(&self, poses: &Poses) -> usd::File {
+        let of_objects = self.prims.iter().zip(&poses.meshes);
+        let of_prims = of_objects.flat_map(|(prims, (points, velocities))| {
+            prims.iter().map(move |prim| (prim, [prim.gather(points), prim.gather(velocities)]))
+        });
+        let of_prims: Vec<(&ObjectPrim, [Vec<Vec3>; 2])> = of_prims.collect();
+        let frames: Vec<usd::MeshFrame> =
+            of_prims.iter().map(|(prim, [points, velocities])| prim.frame(points, velocities)).collect();
         let (fps, units) = (self.scene.shot.fps, usd::Units::OWN);
         usd::clip("objects", poses.frame, fps, units, &frames)
     }
@@ -86,6 +85,15 @@ impl Stage for Objects<'_> {
         settings_of(self.scene, self.name(), self.input_hashes, &Role::MOVING)
     }
 
+    /// Earlier versions wrote one prim for all nodes of a character.
+    fn is_outdated(&self, done: &DoneFrames) -> Result<bool> {
+        let Some(first) = done.frames().next().filter(|_| self.scene.output.objects_usd) else {
+            return Ok(false);
+        };
+        let Some(contents) = done.contents(first, "objects")? else { return Ok(false) };
+        Ok(self.prims.iter().flatten().any(|prim| contents.get(&prim.name).is_none()))
+    }
+
     fn has_memory(&self) -> bool {
         false
     }
@@ -99,17 +107,8 @@ impl Stage for Objects<'_> {
     }
 
     fn clips(&self) -> Vec<Clips<'_>> {
-        let uvs = self.bodies.iter().map(|body| body.motion().drawn().uvs);
-        let named = self.names.iter().cloned().zip(uvs);
-        let mesh = |(name, uvs)| MeshPrim {
-            name,
-            look: Look::Object,
-            moves: true,
-            uvs,
-            primvars: Vec::new(),
-            shading: Shading::Creased,
-        };
-        vec![Clips::new("objects", ClipPrims::Meshes(named.map(mesh).collect()))]
+        let meshes = self.prims.iter().flatten().map(ObjectPrim::mesh).collect();
+        vec![Clips::new("objects", ClipPrims::Meshes(meshes))]
     }
 }
 
@@ -147,12 +146,12 @@ impl Stepping for Objects<'_> {
 
     fn write(&self, _writer: &mut (), step: Option<Poses>, files: Option<&mut FrameFiles>) -> Result<()> {
         let (Some(poses), Some(files)) = (step, files) else { return Ok(()) };
-        let drawn: Vec<Drawn> = self.bodies.iter().map(|body| body.motion().drawn()).collect();
         if self.scene.output.objects_ply {
+            let drawn: Vec<Drawn> = self.bodies.iter().map(|body| body.motion().drawn()).collect();
             files.save("objects", "ply", &self.ply(&poses, &drawn))?;
         }
         if self.scene.output.objects_usd {
-            files.save_usd("objects", self.usd(&poses, &drawn))?;
+            files.save_usd("objects", self.usd(&poses))?;
         }
         Ok(())
     }
