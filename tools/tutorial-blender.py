@@ -37,6 +37,7 @@ scene.render.engine = "CYCLES"
 scene.cycles.samples = 24
 scene.cycles.use_denoising = True
 scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 360, 240, 100
+scene.render.dither_intensity = 0
 scene.render.image_settings.color_mode = "RGB"
 scene.render.image_settings.compression = 100
 scene.render.filepath = out
