@@ -23,7 +23,7 @@ scene.collection.objects.link(camera)
 scene.camera = camera
 
 sun = bpy.data.objects.new("sun", bpy.data.lights.new("sun", "SUN"))
-sun.data.energy = 4.0
+sun.data.energy = 4.5
 sun.rotation_euler = (math.radians(55), 0, math.radians(float(azimuth)))
 scene.collection.objects.link(sun)
 world = bpy.data.worlds.new("world")
@@ -31,7 +31,7 @@ scene.world = world
 world.use_nodes = True
 background = world.node_tree.nodes["Background"]
 background.inputs[0].default_value = (0.65, 0.7, 0.8, 1)
-background.inputs[1].default_value = 0.5
+background.inputs[1].default_value = 0.35
 
 scene.render.engine = "CYCLES"
 scene.cycles.samples = 24
