@@ -315,8 +315,8 @@ fn blocks(text: &'static str) -> Vec<[&'static str; 3]> {
     pairs.map(block).collect()
 }
 
-/// A file or a command of a tutorial with coarse cells and small pictures, for the ball of the tests: it has other
-/// particles and no colours.
+/// A file or a command of a tutorial with coarse cells, few frames and small pictures, and with the spacing of the tests' ball, which
+/// has no colours.
 fn coarse(text: &str) -> String {
     let changes = [
         ("cell = 0.01 ", "cell = 0.04 "),
@@ -325,6 +325,11 @@ fn coarse(text: &str) -> String {
         ("cell = 0.0005 ", "cell = 0.004 "),
         ("0.0125", "0.01"),
         (" --color paint", ""),
+        ("\"1-48\"", "\"1-10\""),
+        ("--frames 1-34", "--frames 1-8"),
+        ("--frame 30", "--frame 8"),
+        ("--frame 34", "--frame 8"),
+        ("--frame 48", "--frame 10"),
         (" --size 360x240", ""),
         (" --size 320x214", ""),
         (" --size 240x160", ""),
