@@ -177,7 +177,7 @@ site:
 	@./tools/site target/site
 
 # The pictures of characters and liquids in docs/, from models and caches in FRAZIL_DATA; those of the walker, the jelly and the drop
-# come from `make demo`.
+# come from `make demo`. Those that Blender renders need FRAZIL_BLENDER: tools/tutorial-pictures.
 pictures: setup
 	$(BUILD)
 	@./tools/pictures "$${FRAZIL_DATA:-../shared/data}" target/pictures docs/pictures

@@ -11,6 +11,11 @@ use crate::program::{CUBE, Folder, GRAINS};
 const README: &str = include_str!("../../../README.md");
 const CLI: &str = include_str!("../../../docs/cli.md");
 const SCENE: &str = include_str!("../../../docs/scene.md");
+const TUTORIALS: [(&str, &str); 3] = [
+    ("snow", include_str!("../../../docs/tutorials/snow.md")),
+    ("surface", include_str!("../../../docs/tutorials/surface.md")),
+    ("shallow", include_str!("../../../docs/tutorials/shallow.md")),
+];
 
 /// The size of pictures: small ones show as much.
 const SIZE: &str = "160x90";
@@ -297,6 +302,65 @@ fn the_page_of_surface_runs_and_has_every_key() {
     let scene = works(folder, "frazil new surface");
     fs::write(folder.join("new.toml"), scene.replace("\"1-120\"", "\"1-41\"")).unwrap();
     works(folder, "frazil surface new.toml -o new/");
+}
+
+/// The blocks of a page: what kind each is, the line of text before it, and what it holds.
+fn blocks(text: &'static str) -> Vec<[&'static str; 3]> {
+    let parts: Vec<&str> = text.split("```").collect();
+    let pairs = parts.windows(2).step_by(2);
+    let block = |pair: &[&'static str]| {
+        let (kind, body) = pair[1].split_once('\n').unwrap();
+        [kind, pair[0].trim_end().lines().last().unwrap_or_default(), body]
+    };
+    pairs.map(block).collect()
+}
+
+/// A file or a command of a tutorial with coarse cells, few frames and small pictures, and with the spacing of the tests' ball, which
+/// has no colours.
+fn coarse(text: &str) -> String {
+    let changes = [
+        ("cell = 0.01 ", "cell = 0.04 "),
+        ("cell = 0.03 ", "cell = 0.12 "),
+        ("cell = 0.001 ", "cell = 0.004 "),
+        ("cell = 0.0005 ", "cell = 0.004 "),
+        ("0.0125", "0.01"),
+        (" --color paint", ""),
+        ("\"1-48\"", "\"1-10\""),
+        ("--frames 1-34", "--frames 1-8"),
+        ("--frame 30", "--frame 8"),
+        ("--frame 34", "--frame 8"),
+        ("--frame 48", "--frame 10"),
+        (" --size 360x240", ""),
+        (" --size 320x214", ""),
+        (" --size 240x160", ""),
+        (" --size 240x288", ""),
+    ];
+    changes.iter().fold(text.to_string(), |text, (from, to)| text.replace(from, to))
+}
+
+#[test]
+fn the_tutorials_run() {
+    for (name, text) in TUTORIALS {
+        let folder = Folder::empty();
+        fs::write(folder.join("hero.glb"), hero::glb()).unwrap();
+        write_cache(&folder, "drip", &ball(4.0, 8, 0.0), 32);
+        let mut count = 0;
+        for [kind, before, body] in blocks(text) {
+            if kind == "sh" {
+                for line in lines(body) {
+                    works(&folder, &coarse(line));
+                    count += 1;
+                }
+                continue;
+            }
+            // "Save this as `FILE`:", or "Add this at the end of `FILE`:".
+            let file = folder.join(before.split('`').nth_back(1).unwrap());
+            let begun =
+                if before.contains("end of") { fs::read_to_string(&file).unwrap() } else { String::new() };
+            fs::write(&file, begun + &coarse(body)).unwrap();
+        }
+        assert!(count >= 10, "{name}: {count}");
+    }
 }
 
 #[test]
