@@ -84,6 +84,16 @@ impl System {
         }
     }
 
+    /// The system with a stage of this name.
+    pub(crate) fn of_stage(name: &str) -> Option<Self> {
+        match name {
+            "base" | "grains" | "mist" | "volumes" | "objects" => Some(Self::Snow),
+            "surface" => Some(Self::Surface),
+            "liquid" => Some(Self::Shallow),
+            _ => None,
+        }
+    }
+
     /// A title for its starter scene.
     pub(crate) fn title(self) -> &'static str {
         match self {
@@ -370,7 +380,13 @@ impl Scene {
     }
 
     fn part<'a, T>(&self, of: System, part: Option<&'a T>) -> Result<&'a T> {
-        let missing = || Error::argument(format!("{}: `{}` is missing", self.path.display(), of.name()));
+        let missing = || {
+            let (own, path) = (self.system.name(), self.path.display());
+            Error::argument(format!(
+                "{path}: is a scene of [{own}], for `frazil {own}`; `{}` is missing",
+                of.name()
+            ))
+        };
         part.ok_or_else(missing)
     }
 

@@ -62,7 +62,8 @@ pub fn is_same() -> (bool, String) {
     works(&mut run("killed", "2", FRAMES));
     let resumed = files_of(&folder.path().join("killed")) == whole;
     let mut earlier = run("earlier", "2", &format!("1-{EARLIER}"));
-    SNOW.iter().for_each(|setting| {
+    // That version had no 16-bit mist, nor a key that says so.
+    SNOW.iter().filter(|setting| !setting.contains("mist_half")).for_each(|setting| {
         earlier.args(["--set", setting]);
     });
     works(&mut earlier);

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::io::files::{atomic, hash};
 use crate::io::records::checksummed;
 use crate::io::usd;
-use crate::scene::FrameChoice;
+use crate::scene::{FrameChoice, System};
 
 /// The scene with its defaults.
 pub(super) const SCENE: &str = "scene.toml";
@@ -92,11 +92,21 @@ impl OwnFiles {
         self.known.files.keys().map(String::as_str)
     }
 
-    /// Fails if the run would overwrite a file that no run wrote, or an input of the scene.
+    /// Fails if the run would overwrite a file that no run wrote, or an input of the scene, or if the folder holds a shot of another system.
     ///
     /// # Errors
-    /// The file that would be overwritten.
+    /// The file that would be overwritten; the other system.
     pub fn refuse_foreign(&self, pipeline: &Pipeline, frames: &FrameChoice) -> Result<()> {
+        let system = pipeline.scene.system();
+        let systems = self.known.stages.keys().filter_map(|stage| System::of_stage(stage));
+        if let Some(other) = systems.into_iter().find(|other| *other != system) {
+            let what = format!(
+                "holds a shot of [{}], and this is one of [{}]: choose another -o",
+                other.name(),
+                system.name()
+            );
+            return Err(Error::file(&self.folder, what));
+        }
         for input in pipeline.scene.files() {
             if input.parent().is_some_and(|folder| self.writes_to(folder, &input)) {
                 let what = "is an input of the scene and would be overwritten: choose another -o";

@@ -7,6 +7,7 @@ use frazil::geometry::{TriMesh, Vec3};
 use frazil::io::mesh;
 use serde_json::Value;
 
+use crate::common::character::output;
 use crate::picture::Picture;
 use crate::program::{CUBE, Folder, fails, frazil, works};
 
@@ -348,4 +349,20 @@ fn frames_without_liquid_are_drawn_too() {
     assert_eq!(reports.each_ref().map(|report| report["vertices"] == 0), [true, true, false]);
     works(folder, "preview out --frames 1-3 -o p.%04d.png --size 32x24");
     works(folder, "check out");
+}
+
+#[test]
+fn a_folder_holds_the_shot_of_one_system() {
+    let folder = &Folder::empty();
+    write_scene(folder, POUR);
+    works(folder, "shallow spill.toml -o out -q --frames 1-2");
+    fs::write(folder.join("cube.obj"), CUBE).unwrap();
+    let snow = "[shot]\nframes = \"1-2\"\n[snow]\nground = 0.0\narea = [-1, -1, 1, 1]\ndepth = 0.3\ncell = 0.1\n\
+                [[object]]\nfile = \"cube.obj\"\n";
+    fs::write(folder.join("walk.toml"), snow).unwrap();
+    let before = output(&folder.join("out"));
+    let words = ["out: holds a shot of [shallow]", "one of [snow]", "another -o"];
+    fails(folder, "snow walk.toml -o out", 2, &words);
+    assert!(before == output(&folder.join("out")));
+    fails(folder, "shallow walk.toml -o other", 2, &["walk.toml", "[snow]", "frazil snow"]);
 }
