@@ -18,8 +18,8 @@ use super::shell::quoted;
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  frazil take walker.toml deep --set snow.depth=0.4 --set snow.noise.seed=2
-  frazil take walker.toml slow --set shot.fps=48 && frazil snow slow/walker.toml -o slow/cache")]
+  frazil take walker.toml deep --set snow.depth=0.4 --set object.1.file=box.obj
+  frazil take walker.toml seed2 --set snow.noise.seed=2 && frazil snow seed2/walker.toml -o seed2/cache")]
 pub struct Args {
     /// Scene file (TOML).
     scene: PathBuf,

@@ -23,8 +23,7 @@ pub struct LinearPicture {
 /// A pixel of a [`LinearPicture`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinearPixel {
-    /// Red, green, blue, 0 or more, with the primaries of sRGB, multiplied by the opacity: a white surface that faces the sun is a little
-    /// over 1.
+    /// Red, green, blue, 0 or more, with the primaries of sRGB, multiplied by the opacity; a white surface that faces the sun has about 2.
     pub light: [f32; 3],
     /// Opacity, 0 to 1: the share of the background that is hidden.
     pub alpha: f32,

@@ -25,8 +25,8 @@ use reports::{Difference, differences};
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  frazil compare cache/ deep/cache/ -o both.png
-  frazil compare cache/ deep/cache/ --frame 24 -o both.png --size 640x360 --eye 1,1.5,2 --target 0,0,1")]
+  frazil compare cache/ seed2/cache/ -o both.png
+  frazil compare cache/ seed2/cache/ --frame 24 -o both.png --size 640x360 --eye 1,1.5,2 --target 0,0,1")]
 pub struct Args {
     /// Output folder of `frazil snow`, `surface` or `shallow`.
     a: PathBuf,
