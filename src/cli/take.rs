@@ -69,7 +69,7 @@ fn prepare(folder: &Path) -> Result<bool> {
     let io = |action| move |error| Error::io(folder, action, error);
     match std::fs::symlink_metadata(folder) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            std::fs::create_dir(folder).map_err(io("make"))?;
+            std::fs::create_dir(folder).map_err(io("create the folder"))?;
             Ok(true)
         }
         Err(error) => Err(io("read")(error)),

@@ -37,6 +37,9 @@ impl LinearPixel {
 }
 
 impl LinearPicture {
+    /// Memory of a pixel, of its channels while they are packed, and of the file (bytes).
+    pub(super) const BYTES_PER_PIXEL: u64 = 20 + 12 + 12;
+
     /// The bytes of an OpenEXR file: channels R, G, B and A in 16 bits, Z in 32, scan lines packed without loss (ZIP). They are the same
     /// with any number of threads.
     ///

@@ -89,7 +89,7 @@ impl Models {
     /// threads.
     ///
     /// # Errors
-    /// As [`Models::draw`].
+    /// As [`Models::draw`]; more memory than is allowed.
     pub fn draw_linear(
         &self,
         ctx: &Context,
@@ -99,8 +99,10 @@ impl Models {
     ) -> Result<LinearPicture> {
         size.check()?;
         ctx.phase("draw", || {
+            let count = size.width as usize * size.height as usize;
+            ctx.allow("a picture for compositing", count as u64 * LinearPicture::BYTES_PER_PIXEL)?;
             let view = View { has_background: false, ..self.view(ctx, camera, light, size)? };
-            let mut pixels = vec![LinearPixel::EMPTY; size.width as usize * size.height as usize];
+            let mut pixels = vec![LinearPixel::EMPTY; count];
             self.fill(ctx, &view, &mut pixels, |rays, (light, passed)| {
                 let depths = rays.iter().filter_map(|(toward, hit)| {
                     hit.as_ref().map(|hit| view.lens.depth(*toward * hit.distance))

@@ -21,7 +21,7 @@ use reports::{Difference, differences};
 /// Draw a frame of two output folders side by side, seen from one camera, and print the numbers in which they differ.
 ///
 /// A is drawn on the left, B on the right, each in the size of --size. The lines below name the numbers in the reports of that frame that
-/// differ, as stage, key, value in A, value in B; - stands for none. Times are left out.
+/// differ, as stage, key, value in A, value in B; - stands for none. Items of lists count from 1. Times are left out.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:

@@ -7,17 +7,23 @@ use super::declaration::Key;
 use super::overrides::Override;
 
 /// The text of a scene file, to be changed.
-pub struct EditedText(DocumentMut);
+pub struct EditedText {
+    document: DocumentMut,
+    /// Whether its lines end as on Windows; `document` does not keep that.
+    has_carriage_returns: bool,
+}
 
 impl EditedText {
     /// Reads TOML; none if it is not.
     pub fn parse(text: &str) -> Option<Self> {
-        text.parse().ok().map(Self)
+        let document = text.parse().ok()?;
+        Some(Self { document, has_carriage_returns: text.contains("\r\n") })
     }
 
     /// The text.
     pub fn text(&self) -> String {
-        self.0.to_string()
+        let text = self.document.to_string();
+        if self.has_carriage_returns { text.replace("\r\n", "\n").replace('\n', "\r\n") } else { text }
     }
 
     /// Writes a setting in the place of the value that it overrides, or behind the last key of its table; none if it cannot be applied.
@@ -25,7 +31,11 @@ impl EditedText {
         // As when a setting is applied: a value that is not TOML is a text.
         let is_toml = DeValue::parse(&setting.value).is_ok();
         let value = setting.value.parse::<Value>().ok().filter(|_| is_toml);
-        set(self.0.as_table_mut(), &setting.key, value.unwrap_or_else(|| setting.value.as_str().into()))
+        set(
+            self.document.as_table_mut(),
+            &setting.key,
+            value.unwrap_or_else(|| setting.value.as_str().into()),
+        )
     }
 
     /// The text that is a key's value, if there is one; `index` is that of its table in an array of tables.
@@ -41,7 +51,7 @@ impl EditedText {
     }
 
     fn value_mut(&mut self, key: &Key, index: Option<usize>) -> Option<&mut Value> {
-        let mut table: &mut dyn TableLike = self.0.as_table_mut();
+        let mut table: &mut dyn TableLike = self.document.as_table_mut();
         for part in key.table.split('.') {
             let item = table.get_mut(part)?;
             table = match index {
@@ -116,6 +126,8 @@ mod tests {
         let wanted = "# A shot.\n\n[shot]\n# Few.\nframes = \"3-4\" # first, last\nfps = 25\n\n# Behind.\n[[object]]\n\
                       file = \"b.obj\"\nscale = 0.1\n# End.\n";
         assert_eq!(edited(text, &settings), wanted);
+        let of_windows = |text: &str| text.replace('\n', "\r\n");
+        assert_eq!(edited(&of_windows(text), &settings), of_windows(wanted));
     }
 
     #[test]

@@ -93,5 +93,7 @@ fn frames_of_a_shot_are_numbered_exr_files() {
         &["p.exr", "several frames need a pattern"],
     );
     fails(folder, "preview cube.0001.obj --cut x=0 -o cut.exr", 2, &["cut.exr", "--cut", ".png"]);
+    let big = "preview cube.0001.obj -o big.exr --size 1000x1000 --max-memory 40M";
+    fails(folder, big, 2, &["a picture for compositing", "44 MB"]);
     fails(folder, "preview cube.0001.obj -o p.tif", 2, &["p.tif", ".png", ".exr", ".gif"]);
 }
