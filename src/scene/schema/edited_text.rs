@@ -69,12 +69,20 @@ fn set(table: &mut dyn TableLike, key: &[String], value: Value) -> Option<()> {
     if rest.is_empty() {
         match table.get_mut(name) {
             Some(Item::Value(old)) => replace(old, value),
-            Some(other) => *other = Item::Value(without_space(value)),
-            None => _ = table.insert(name, Item::Value(without_space(value))),
+            Some(other) => {
+                // A table becomes a value, whose key has other spaces.
+                *other = Item::Value(without_space(value));
+                table.key_mut(name)?.fmt();
+            }
+            None => {
+                trim_last(table);
+                table.insert(name, Item::Value(without_space(value)));
+            }
         }
         return Some(());
     }
     if !table.contains_key(name) {
+        trim_last(table);
         table.insert(name, Item::Table(Table::new()));
     }
     let item = table.get_mut(name)?;
@@ -99,6 +107,15 @@ fn replace(old: &mut Value, value: Value) {
     let decor = old.decor().clone();
     *old = value;
     *old.decor_mut() = decor;
+}
+
+/// Removes the spaces behind the last value of a table, which in an inline table stand before its brace.
+fn trim_last(table: &mut dyn TableLike) {
+    let Some((_, Item::Value(last))) = table.iter_mut().last() else { return };
+    let suffix = last.decor().suffix().and_then(|suffix| suffix.as_str());
+    if suffix.is_some_and(|suffix| suffix.trim().is_empty()) {
+        last.decor_mut().set_suffix("");
+    }
 }
 
 /// A value with the spaces that TOML usually has.
