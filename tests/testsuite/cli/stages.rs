@@ -8,7 +8,7 @@ use crate::program::{CUBE, Folder, works};
 
 /// The stages that a scene has: the tasks of a farm but the first and the last.
 fn stages(folder: &Path, scene: &str) -> Vec<String> {
-    let tasks = works(folder, &format!("jobs {scene} -o cache --chunk 1000"));
+    let tasks = works(folder, &format!("jobs {scene} -o cache --chunk 1000 -q"));
     let names = tasks.lines().filter_map(|line| line.split(' ').next());
     names.filter(|name| !["prepare", "finish"].contains(name)).map(String::from).collect()
 }

@@ -125,6 +125,37 @@ fn a_take_is_the_scene_with_its_settings_in_their_places() {
 }
 
 #[test]
+fn settings_go_into_tables_of_every_form() {
+    let folder = &shot();
+    let inline = "shot = { frames = \"1-2\" }\nsnow = { cell = 0.1, ground = 0, depth = 0.3, area = [0, 0, 1, 1], noise = { seed = 1 } }\n\
+                  object = [{ file = \"props/cube.obj\" }]\n";
+    fs::write(folder.join("inline.toml"), inline).unwrap();
+    let settings =
+        "--set snow.noise.seed=2 --set snow.noise.size=3 --set object.1.role=static --set grains.max=100";
+    works(folder, &format!("take inline.toml inline {settings}"));
+    let wanted = inline
+        .replace("seed = 1", "seed = 2, size = 3")
+        .replace("\"props/cube.obj\"", "\"../props/cube.obj\", role = \"static\"");
+    assert_eq!(text(folder, "inline/inline.toml"), format!("{wanted}\n[grains]\nmax = 100\n"));
+    // A table becomes a value.
+    fs::write(
+        folder.join("noise.toml"),
+        SHOT.replace("\n[[object]]", "\n[snow.noise]\nseed = 2\n\n[[object]]"),
+    )
+    .unwrap();
+    works(folder, "take noise.toml noise --set snow.noise={size=3}");
+    let made = text(folder, "noise/noise.toml");
+    assert!(made.contains("cell = 0.06\nnoise = {size=3}\n") && !made.contains("seed"), "{made}");
+    // The ends of lines as on Windows.
+    fs::write(folder.join("windows.toml"), SHOT.replace('\n', "\r\n")).unwrap();
+    works(folder, "take windows.toml windows");
+    assert_eq!(
+        text(folder, "windows/windows.toml"),
+        SHOT.replace("\"props/", "\"../props/").replace('\n', "\r\n")
+    );
+}
+
+#[test]
 fn files_of_settings_are_relative_to_the_current_folder() {
     let folder = &shot();
     let other = Folder::empty();
