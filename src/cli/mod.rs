@@ -1,6 +1,7 @@
 //! The command line: one file per command.
 
 mod check;
+mod compare;
 mod convert;
 mod frame_results;
 mod info;
@@ -12,7 +13,9 @@ mod output;
 mod points;
 mod preview;
 mod session;
+mod shell;
 mod shot;
+mod take;
 #[cfg(feature = "vdb")]
 mod vdb;
 
@@ -39,6 +42,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     New(new::Args),
+    Take(take::Args),
     Check(check::Args),
     Jobs(jobs::Args),
     #[cfg(feature = "vdb")]
@@ -52,12 +56,14 @@ enum Command {
     Convert(convert::Args),
     Info(info::Args),
     Preview(preview::Args),
+    Compare(compare::Args),
 }
 
 impl Command {
     fn run(self, session: &Session) -> Result<(), Failure> {
         match self {
             Self::New(args) => new::run(&args),
+            Self::Take(args) => take::run(&args, session),
             Self::Check(args) => check::run(&args, session),
             Self::Jobs(args) => jobs::run(&args, session),
             #[cfg(feature = "vdb")]
@@ -71,6 +77,7 @@ impl Command {
             Self::Convert(args) => convert::run(&args, session),
             Self::Info(args) => info::run(args, session),
             Self::Preview(args) => preview::run(args, session),
+            Self::Compare(args) => compare::run(&args, session),
         }
     }
 }

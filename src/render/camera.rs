@@ -152,6 +152,11 @@ impl Lens {
         (ahead + right * across + up * upward).normalize()
     }
 
+    /// Pixels in a row of the picture.
+    pub fn width(&self) -> usize {
+        self.size.width as usize
+    }
+
     /// Depth of a point (m), negative behind the eye; `offset` is its offset from the eye (m).
     pub fn depth(&self, offset: DVec3) -> f64 {
         offset.dot(&self.axes[2])

@@ -20,7 +20,8 @@ impl Model {
     }
 }
 
-/// Light from a liquid's surface: its own (`surface`), the light from below that it transmits, and reflections.
+/// Light from a liquid's surface: its own (`surface`), the light from below that it transmits, and reflections; and the share of the light
+/// from below that it transmits, 0 to 1.
 pub(super) fn shade_liquid(
     light: &Light,
     hit: &Hit,
@@ -28,9 +29,10 @@ pub(super) fn shade_liquid(
     [surface, below]: [Colour; 2],
     toward: DVec3,
     blocked: impl Fn(DVec3) -> bool,
-) -> Colour {
+) -> (Colour, f64) {
     let body = below.lerp(&surface, opacity);
     let (reflectance, mirrored) = gloss(light, hit.normal, toward, blocked);
     let sheen = (opacity / FULL_SHEEN_OPACITY).min(1.0);
-    body * (1.0 - reflectance * sheen) + mirrored * sheen
+    let refracted = 1.0 - reflectance * sheen;
+    (body * refracted + mirrored * sheen, (1.0 - opacity) * refracted)
 }

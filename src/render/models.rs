@@ -2,6 +2,7 @@
 
 use super::camera::{Camera, Lens, Size};
 use super::fog::{Fog, LitFogs, Veil};
+use super::linear::{LinearPicture, LinearPixel};
 use super::liquid::{MAX_FILMS, shade_liquid};
 use super::model::{Hit, Model};
 use super::picture::Picture;
@@ -17,6 +18,8 @@ use rayon::prelude::*;
 const SAMPLES: usize = 3;
 /// Samples of a pixel.
 const RAYS: usize = SAMPLES * SAMPLES;
+/// Unit direction and nearest hit of the ray through each sample of a pixel.
+type Rays = [(DVec3, Option<Hit>); RAYS];
 
 /// The camera, the light, and everything prepared for them.
 struct View<'a> {
@@ -30,7 +33,12 @@ struct View<'a> {
     fogs: LitFogs<'a>,
     /// Whether one ray through the fogs suffices for all samples of a pixel.
     is_smooth: bool,
+    /// Whether rays that hit nothing see the sky; else they see nothing.
+    has_background: bool,
 }
+
+/// Light that arrives along a ray, and the share of the light from behind everything that passes, 0 to 1.
+type Arriving = (Colour, f64);
 
 /// Models, clouds of points and fogs in one picture.
 pub struct Models {
@@ -71,16 +79,59 @@ impl Models {
         size.check()?;
         ctx.phase("draw", || {
             let view = self.view(ctx, camera, light, size)?;
-            let row_bytes = 3 * size.width as usize;
-            let mut rgb = vec![0; row_bytes * size.height as usize];
-            rgb.par_chunks_mut(row_bytes).enumerate().try_for_each(|(y, row)| {
-                ctx.check()?;
-                for (x, pixel) in row.chunks_mut(3).enumerate() {
-                    pixel.copy_from_slice(&self.pixel(&view, [x, y]));
+            let mut rgb = vec![[0; 3]; size.width as usize * size.height as usize];
+            self.fill(ctx, &view, &mut rgb, |_, (light, _)| to_bytes(light))?;
+            Ok(Picture { size, rgb: rgb.into_flattened() })
+        })
+    }
+
+    /// Draws the picture for compositing, without the sky behind it: linear light, opacity and depth. The same values with any number of
+    /// threads.
+    ///
+    /// # Errors
+    /// As [`Models::draw`]; more memory than is allowed.
+    pub fn draw_linear(
+        &self,
+        ctx: &Context,
+        camera: &Camera,
+        light: &Light,
+        size: Size,
+    ) -> Result<LinearPicture> {
+        size.check()?;
+        ctx.phase("draw", || {
+            let count = size.width as usize * size.height as usize;
+            ctx.allow("a picture for compositing", count as u64 * LinearPicture::BYTES_PER_PIXEL)?;
+            let view = View { has_background: false, ..self.view(ctx, camera, light, size)? };
+            let mut pixels = vec![LinearPixel::EMPTY; count];
+            self.fill(ctx, &view, &mut pixels, |rays, (light, passed)| {
+                let depths = rays.iter().filter_map(|(toward, hit)| {
+                    hit.as_ref().map(|hit| view.lens.depth(*toward * hit.distance))
+                });
+                LinearPixel {
+                    light: [light.x as f32, light.y as f32, light.z as f32],
+                    alpha: (1.0 - passed) as f32,
+                    depth: depths.fold(f64::INFINITY, f64::min) as f32,
                 }
-                Ok(())
             })?;
-            Ok(Picture { size, rgb })
+            Ok(LinearPicture { size, pixels })
+        })
+    }
+
+    /// Fills pixels, row by row in parallel, with what `finish` makes of a pixel's rays and of their mean.
+    fn fill<P: Send>(
+        &self,
+        ctx: &Context,
+        view: &View<'_>,
+        pixels: &mut [P],
+        finish: impl Fn(&Rays, Arriving) -> P + Sync,
+    ) -> Result<()> {
+        pixels.par_chunks_mut(view.lens.width()).enumerate().try_for_each(|(y, row)| {
+            ctx.check()?;
+            for (x, pixel) in row.iter_mut().enumerate() {
+                let rays = self.rays(view, [x, y]);
+                *pixel = finish(&rays, self.mean(view, &rays));
+            }
+            Ok(())
         })
     }
 
@@ -96,28 +147,36 @@ impl Models {
         let blocked = |point, toward| self.is_blocked(shadows.as_ref(), point, toward);
         let fogs = LitFogs::new(ctx, &self.fogs, light.sun, blocked)?;
         let is_smooth = fogs.is_smooth(camera, size);
-        Ok(View { camera, lens: camera.lens(size), light, splats, shadows, fogs, is_smooth })
+        let lens = camera.lens(size);
+        Ok(View { camera, lens, light, splats, shadows, fogs, is_smooth, has_background: true })
     }
 
-    fn pixel(&self, view: &View<'_>, [x, y]: [usize; 2]) -> [u8; 3] {
+    /// The rays through the samples of a pixel.
+    fn rays(&self, view: &View<'_>, [x, y]: [usize; 2]) -> Rays {
         let eye = view.camera.eye;
-        let rays: [(DVec3, Option<Hit>); RAYS] = std::array::from_fn(|sample| {
+        std::array::from_fn(|sample| {
             let inside = |index: usize| (index as f64 + 0.5) / SAMPLES as f64;
             let (right, down) = (sample % SAMPLES, sample / SAMPLES);
             let toward = view.lens.through(x as f64 + inside(right), y as f64 + inside(down));
             let splat = view.splats.at(x * SAMPLES + right, y * SAMPLES + down, eye, toward);
             (toward, self.hit(eye, toward, splat))
-        });
-        let veils = self.veils(view, &rays);
-        let mut sum = Colour::zeros();
+        })
+    }
+
+    /// The mean of the light along the rays of a pixel, and of the share that passes.
+    fn mean(&self, view: &View<'_>, rays: &Rays) -> Arriving {
+        let eye = view.camera.eye;
+        let veils = self.veils(view, rays);
+        let (mut sum, mut passed) = (Colour::zeros(), 0.0);
         for (sample, ((toward, hit), veil)) in rays.iter().zip(&veils).enumerate() {
             if veil.transmittance > 0.0 {
-                sum +=
-                    self.radiance(view, (eye, *toward), hit.as_ref(), sample, MAX_FILMS) * veil.transmittance;
+                let (light, share) = self.radiance(view, (eye, *toward), hit.as_ref(), sample, MAX_FILMS);
+                sum += light * veil.transmittance;
+                passed += share * veil.transmittance;
             }
             sum += veil.light;
         }
-        to_bytes(sum / RAYS as f64)
+        (sum / RAYS as f64, passed / RAYS as f64)
     }
 
     /// The nearest hit on a ray; `splat` is the ray's hit with a point of a cloud, if any.
@@ -127,7 +186,7 @@ impl Models {
     }
 
     /// Effect of the fogs on the samples of a pixel.
-    fn veils(&self, view: &View<'_>, rays: &[(DVec3, Option<Hit>); RAYS]) -> [Veil; RAYS] {
+    fn veils(&self, view: &View<'_>, rays: &Rays) -> [Veil; RAYS] {
         if self.fogs.is_empty() {
             return [Veil::NONE; RAYS];
         }
@@ -158,20 +217,25 @@ impl Models {
         hit: Option<&Hit>,
         sample: usize,
         films: usize,
-    ) -> Colour {
-        let Some(hit) = hit else { return view.light.background(toward) };
+    ) -> Arriving {
+        let Some(hit) = hit else {
+            let behind = if view.has_background { view.light.background(toward) } else { Colour::zeros() };
+            return (behind, 1.0);
+        };
         let point = origin + toward * hit.distance + hit.normal * hit.shadow_bias;
         let blocked = |direction| self.is_blocked(view.shadows.as_ref(), point, direction);
         let transmittance =
             |direction| if self.fogs.is_empty() { 1.0 } else { view.fogs.sunlight(point, direction) };
         let surface = shade(view.light, hit.normal, hit.albedo, sample, hit.wrap, blocked, transmittance);
-        let Some(opacity) = hit.opacity else { return surface };
+        let Some(opacity) = hit.opacity else { return (surface, 0.0) };
         if films == 0 || opacity >= 1.0 {
-            return shade_liquid(view.light, hit, 1.0, [surface, surface], toward, blocked);
+            let (light, _) = shade_liquid(view.light, hit, 1.0, [surface, surface], toward, blocked);
+            return (light, 0.0);
         }
         let behind = origin + toward * (hit.distance + hit.shadow_bias);
         let next = self.hit(behind, toward, None);
-        let below = self.radiance(view, (behind, toward), next.as_ref(), sample, films - 1);
-        shade_liquid(view.light, hit, opacity, [surface, below], toward, blocked)
+        let (below, passed) = self.radiance(view, (behind, toward), next.as_ref(), sample, films - 1);
+        let (light, share) = shade_liquid(view.light, hit, opacity, [surface, below], toward, blocked);
+        (light, share * passed)
     }
 }

@@ -13,7 +13,32 @@ pub struct Picture {
     pub rgb: Vec<u8>,
 }
 
+/// Width (pixels) and grey of the line between two pictures.
+const LINE_WIDTH: u32 = 2;
+const LINE_GREY: u8 = 24;
+
 impl Picture {
+    /// This picture and another to its right, with a dark line of 2 pixels between them.
+    ///
+    /// # Errors
+    /// Heights that differ.
+    pub fn beside(&self, right: &Self) -> Result<Self> {
+        let (a, b) = (self.size, right.size);
+        if a.height != b.height {
+            return Err(Error::argument(format!(
+                "pictures of {} and {} rows do not go together",
+                a.height, b.height
+            )));
+        }
+        let row = |picture: &Self, y: u32| {
+            let bytes = 3 * picture.size.width as usize;
+            picture.rgb[y as usize * bytes..][..bytes].to_vec()
+        };
+        let line = vec![LINE_GREY; 3 * LINE_WIDTH as usize];
+        let rgb = (0..a.height).flat_map(|y| [row(self, y), line.clone(), row(right, y)].concat()).collect();
+        Ok(Self { size: Size { width: a.width + LINE_WIDTH + b.width, height: a.height }, rgb })
+    }
+
     /// Writes a PNG file atomically.
     ///
     /// # Errors
@@ -40,5 +65,24 @@ impl Picture {
         encoder.set_filter(png::Filter::Adaptive);
         encoder.write_header()?.write_image_data(&self.rgb)?;
         Ok(bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_of_one_height_go_beside_each_other() {
+        let uniform = |width, height, grey| {
+            let size = Size { width, height };
+            Picture { size, rgb: vec![grey; 3 * (width * height) as usize] }
+        };
+        let both = uniform(1, 2, 100).beside(&uniform(2, 2, 200)).unwrap();
+        assert_eq!(both.size, Size { width: 5, height: 2 });
+        let row: Vec<u8> =
+            [100, LINE_GREY, LINE_GREY, 200, 200].into_iter().flat_map(|grey| [grey; 3]).collect();
+        assert_eq!(both.rgb, row.repeat(2));
+        assert!(uniform(1, 2, 0).beside(&uniform(1, 3, 0)).is_err());
     }
 }

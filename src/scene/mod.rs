@@ -15,6 +15,7 @@
 //! | pass | a stage's loop over the frames to be made |
 //! | record | the manifest of a frame's files, written last: a frame is done when it exists |
 //! | settings | the values that a stage depends on; if one changes, the stage's frames must be made again |
+//! | take | a copy of a scene file with settings written into it, in a folder beside it |
 //! | state | the exact data that a pass resumes from: a stage's own files, or bytes in `state/` |
 
 mod moving;
@@ -36,7 +37,7 @@ pub use snow::{
     FootSlip, Forecast, Inputs, Rebuild, RebuildGrains, changes_since, check_memory, estimate, partial,
 };
 pub use surface::Surface;
-pub use systems::{reference, template};
+pub use systems::{Take, reference, template};
 
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;

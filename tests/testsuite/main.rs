@@ -27,14 +27,18 @@ mod cli {
     mod forecasts;
     mod honest;
     mod limits;
+    mod linear;
     mod origin;
     mod outputs;
     mod points;
     mod repair;
     mod runs;
     mod shallow;
+    mod side_by_side;
     mod soup;
     mod speed;
+    mod stages;
+    mod takes;
     mod tools;
     mod words;
 }
@@ -69,6 +73,7 @@ mod motion {
 mod render {
     mod cut;
     mod fog;
+    mod linear;
     mod points;
     mod preview;
 }

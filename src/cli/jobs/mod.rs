@@ -10,6 +10,7 @@ use frazil::scene::{Override, Scene, System, shallow};
 
 use super::output;
 use super::session::{Failure, OrFailure, Session};
+use super::shell::quoted;
 
 /// Print the tasks of a shot for a farm: one that prepares the folder, one for each stage that goes from frame to frame, chunks of the
 /// stages whose frames do not depend on each other, and one that finishes.
@@ -179,27 +180,4 @@ fn listed(task: &Task) -> String {
         format!("{} {after} {}\n", task.name, words.join(" "))
     };
     task.commands().into_iter().map(line).collect()
-}
-
-/// A word of a shell's command.
-fn quoted(word: &str) -> String {
-    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_./=+:,@%".contains(&byte);
-    if !word.is_empty() && word.bytes().all(is_plain) {
-        return word.into();
-    }
-    format!("'{}'", word.replace('\'', "'\\''"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn words_of_a_command_are_quoted_where_a_shell_needs_it() {
-        for (word, wanted) in
-            [("a/b-1.toml", "a/b-1.toml"), ("a b", "'a b'"), ("", "''"), ("it's", "'it'\\''s'")]
-        {
-            assert_eq!(quoted(word), wanted);
-        }
-    }
 }

@@ -1,6 +1,7 @@
 //! A script that submits a shot to Slurm: a job for each task, and an array for its chunks.
 
-use super::{Task, quoted};
+use super::Task;
+use crate::cli::shell::quoted;
 
 /// Runs after the command of a job. Slurm requeues a job by itself only if its node fails. A job that has failed cancels the jobs that depend
 /// on it, and requeueing it afterwards does not bring them back, so a job requeues itself while it is still running. One that is killed again

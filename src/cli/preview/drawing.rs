@@ -10,6 +10,7 @@ use frazil::render::{Field, SNOW};
 use frazil::vdb::level_set;
 use frazil::{Context, Error, Result};
 
+use super::format::PictureFormat;
 use super::tint::{Tint, Tinted};
 use crate::cli::preview::parts::Part;
 use crate::cli::session::Failure;
@@ -251,6 +252,22 @@ impl View {
         match &drawing.content {
             Content::Models(models) => models.draw(ctx, &self.camera, &self.light, self.size),
             Content::Cut(cut) => cut.draw(ctx, &self.camera, self.size),
+        }
+    }
+
+    /// Draws a picture, as the bytes of a file.
+    ///
+    /// # Errors
+    /// Cancel; an EXR of a cut, whose colours are not light.
+    pub fn encoded(&self, ctx: &Context, drawing: &Drawing, format: PictureFormat) -> Result<Vec<u8>> {
+        match (format, &drawing.content) {
+            (PictureFormat::Png, _) => self.draw(ctx, drawing)?.png(),
+            (PictureFormat::Exr, Content::Models(models)) => {
+                models.draw_linear(ctx, &self.camera, &self.light, self.size)?.exr()
+            }
+            (PictureFormat::Exr, Content::Cut(_)) => {
+                Err(Error::argument("the colours of a cut are not light, which an EXR holds"))
+            }
         }
     }
 

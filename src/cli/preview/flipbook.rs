@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use super::drawing::{Drawing, Look, View};
+use super::format::PictureFormat;
 use super::in_order::in_order;
 use super::sources::Sources;
 use crate::cli::frame_results::FrameResults;
@@ -13,8 +14,8 @@ use crate::cli::shot::progress::{FrameProgress, ProgressFormat};
 use crate::cli::shot::remaining::Remaining;
 use frazil::io::files::atomic;
 use frazil::io::files::sequence::Pattern;
-use frazil::render::{Gif, Palette, Picture, delays};
-use frazil::{Error, Result};
+use frazil::render::{Gif, Palette, delays};
+use frazil::{Context, Error, Result};
 
 /// Maximum number of frames made at once: each holds its snow as triangles, and a memory limit applies to each of them.
 const MAX_AT_ONCE: usize = 4;
@@ -79,17 +80,18 @@ impl<'a> Flipbook<'a> {
         Ok(Self { session, look, sources, frames, view, probes })
     }
 
-    /// Writes a PNG file of each frame atomically, in order; a frame that fails does not stop the others.
+    /// Writes a picture of each frame atomically, in order; a frame that fails does not stop the others.
     ///
     /// # Errors
     /// Files that cannot be read or written; cancel, after which the pictures of earlier frames remain.
-    pub fn pictures(mut self, pattern: &Pattern) -> std::result::Result<(), Failure> {
+    pub fn pictures(mut self, pattern: &Pattern, format: PictureFormat) -> std::result::Result<(), Failure> {
         self.probes.clear();
         let (frames, mut results) = (self.frames.clone(), FrameResults::default());
         self.draw(
-            |picture| picture.png(),
-            |index, png: Result<Vec<u8>>| {
-                let written = png.and_then(|png| atomic::write_bytes(&pattern.path(frames[index]), &png));
+            |ctx, view, drawing| view.encoded(ctx, drawing, format),
+            |index, bytes: Result<Vec<u8>>| {
+                let written =
+                    bytes.and_then(|bytes| atomic::write_bytes(&pattern.path(frames[index]), &bytes));
                 results.record(frames[index], written)
             },
         )?;
@@ -105,7 +107,7 @@ impl<'a> Flipbook<'a> {
         let palette = self.palette().or_fail()?;
         self.probes.clear();
         let (delays, size) = (delays(&self.frames, fps), self.view.size);
-        let (frames, session, mut results) = (self.frames.clone(), self.session, FrameResults::default());
+        let (frames, mut results) = (self.frames.clone(), FrameResults::default());
         // An error of a frame, kept separately so that it is not reported as a write error.
         let mut frame_error = None;
         let written = atomic::write(path, |out| {
@@ -128,7 +130,10 @@ impl<'a> Flipbook<'a> {
                 gif.add(pixels, delay).map_err(|error| Failure::failed(Error::io(path, "write", error)))?;
                 Ok(Some(()))
             };
-            match self.draw(|picture| Ok(palette.indices(&session.ctx, &picture)), add) {
+            let indices = |ctx: &Context, view: &View, drawing: &Drawing| {
+                Ok(palette.indices(ctx, &view.draw(ctx, drawing)?))
+            };
+            match self.draw(indices, add) {
                 Ok(()) => gif.finish(),
                 Err(error) => {
                     frame_error = Some(error);
@@ -142,11 +147,11 @@ impl<'a> Flipbook<'a> {
         }
     }
 
-    /// Draws the frames, several at once: `finish` processes each picture, and `take` gets the results, or errors, in the order of the
+    /// Draws the frames, several at once: `finish` draws each picture, and `take` gets the results, or errors, in the order of the
     /// frames; an error of `take` ends the work.
     fn draw<T: Send>(
         &mut self,
-        finish: impl Fn(Picture) -> Result<T> + Sync,
+        finish: impl Fn(&Context, &View, &Drawing) -> Result<T> + Sync,
         mut take: impl FnMut(usize, Result<T>) -> std::result::Result<Option<()>, Failure>,
     ) -> std::result::Result<(), Failure> {
         let Self { session, look, sources, frames, view, .. } = self;
@@ -157,9 +162,8 @@ impl<'a> Flipbook<'a> {
             let frame = Some(f64::from(frames[index]));
             Ok(sources.refuse_missing(frame).and_then(|()| sources.read(ctx, frame)))
         };
-        let make = |_, parts: Result<_>| {
-            Ok(parts.and_then(|parts| finish(view.draw(ctx, &look.build(ctx, parts)?)?)))
-        };
+        let make =
+            |_, parts: Result<_>| Ok(parts.and_then(|parts| finish(ctx, view, &look.build(ctx, parts)?)));
         let pictures = Remaining::of(&[("picture", frames.len())], Instant::now());
         let format = ProgressFormat::Text.unless(session.is_quiet());
         let mut progress = FrameProgress::new(ctx, pictures, 0, format);

@@ -1,7 +1,9 @@
 //! `frazil preview`: pictures of meshes, level sets, points, fog and whole shots; cuts through grids; flipbooks.
 
-mod drawing;
+mod camera_options;
+pub(in crate::cli) mod drawing;
 mod flipbook;
+mod format;
 #[cfg(feature = "vdb")]
 mod grids;
 mod in_order;
@@ -9,30 +11,35 @@ mod parts;
 mod shallow_folder;
 #[cfg(feature = "vdb")]
 mod shot_folder;
-mod sources;
+pub(in crate::cli) mod sources;
 mod tint;
 
 use std::path::{Path, PathBuf};
 
 use super::session::{Failure, OrFailure, Session};
 use super::{options, output};
+pub(in crate::cli) use camera_options::CameraOptions;
 use drawing::Look;
 use flipbook::Flipbook;
-use frazil::geometry::DVec3;
+use format::PictureFormat;
 use frazil::io::files::atomic;
 use frazil::io::files::sequence::Pattern;
 use frazil::io::mesh::extension;
-use frazil::render::{Camera, Light, Plane, Size};
+use frazil::render::Plane;
 use frazil::scene::FrameChoice;
 use sources::Sources;
 use tint::Tint;
 
-/// Draw meshes, level sets, points, fog or frames of a shot: a PNG, or a flipbook.
+/// Default extinction (1/m) of a fog of density 1.
+pub(in crate::cli) const FOG_DENSITY: f64 = 5.0;
+
+/// Draw meshes, level sets, points, fog or frames of a shot: a PNG, an EXR for compositing, or a flipbook.
 #[derive(clap::Args)]
 #[command(
     group = clap::ArgGroup::new("when").args(["frame", "frames"]),
     after_help = "Examples:\n  frazil preview cache/base/base.0048.vdb boot.obj -o print.png --eye 1,1.5,2 --target 0,0,1\n  \
                   frazil preview cache/ --frame 48 -o look.png\n  \
+                  frazil preview cache/ --frame 48 -o look.exr\n  \
                   frazil preview cache/ --frames 1-48x8 -o shot.gif --size 640x360\n  \
                   frazil preview cache/ --frames 40-42 -o p.%04d.png --size 640x360\n  \
                   frazil preview cache/base/base.0048.vdb --cut x=0 -o cut.png\n  \
@@ -44,7 +51,8 @@ pub struct Args {
     /// `frazil snow`, `surface` or `shallow`, or, with --frame or --frames, a pattern (base.%04d.vdb).
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// The picture (.png); for several frames a pattern (p.%04d.png), or a .gif.
+    /// The picture (.png, or .exr: R, G, B in linear light multiplied by A, without the sky; A, opacity; Z, depth in m along the view
+    /// direction, infinity where nothing is); for several frames a pattern (p.%04d.png, p.%04d.exr), or a .gif.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Attribute that colours points and vertices of a mesh, from dark blue to pale yellow over its values.
@@ -71,33 +79,10 @@ pub struct Args {
     #[arg(long, value_name = "N", value_parser = options::positive)]
     fps: Option<f64>,
     /// Extinction of a fog of density 1 (1/m), if its file does not give it (frazil:density_scale).
-    #[arg(long, value_name = "N", default_value = "5", value_parser = options::positive)]
+    #[arg(long, value_name = "N", default_value_t = FOG_DENSITY, value_parser = options::positive)]
     fog_density: f64,
-    /// Pixels.
-    #[arg(long, default_value = "1280x720", value_parser = options::size)]
-    size: Size,
-    /// Position of the camera (m) [default: so that everything is seen].
-    #[arg(long, value_name = "X,Y,Z", value_parser = options::triple, allow_hyphen_values = true, requires = "target")]
-    eye: Option<DVec3>,
-    /// Point that the camera looks at (m).
-    #[arg(long, value_name = "X,Y,Z", value_parser = options::triple, allow_hyphen_values = true, requires = "eye")]
-    target: Option<DVec3>,
-    /// Vertical field of view (degrees).
-    #[arg(long, default_value_t = 35.0, requires = "eye")]
-    fov: f64,
-    /// Azimuth and elevation of the sun (degrees) [default: beside the camera].
-    #[arg(long, value_name = "AZ,EL", value_parser = sun, allow_hyphen_values = true)]
-    sun: Option<(f64, f64)>,
-}
-
-fn sun(text: &str) -> Result<(f64, f64), String> {
-    let (azimuth, elevation) = text.split_once(',').ok_or("give azimuth,elevation")?;
-    let number = |text: &str| text.trim().parse::<f64>().map_err(|_| format!("\"{text}\" is not a number"));
-    let (azimuth, elevation) = (number(azimuth)?, number(elevation)?);
-    if !(1.0..=90.0).contains(&elevation) || !azimuth.is_finite() {
-        return Err("the elevation must be within 1 to 90 degrees".into());
-    }
-    Ok((azimuth, elevation))
+    #[command(flatten)]
+    camera: CameraOptions,
 }
 
 fn plane(text: &str) -> Result<Plane, String> {
@@ -111,9 +96,9 @@ fn plane(text: &str) -> Result<Plane, String> {
 /// The kind of output.
 enum Job {
     /// A picture, of one frame if anything moves.
-    Still(Option<f64>, PathBuf),
+    Still(Option<f64>, PathBuf, PictureFormat),
     /// A picture of each frame.
-    Pictures(Vec<i32>, Pattern),
+    Pictures(Vec<i32>, Pattern, PictureFormat),
     /// A GIF of all frames.
     Gif(Vec<i32>, PathBuf),
 }
@@ -128,8 +113,10 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     let job = args.job(&sources)?;
     job.check(&sources).or_refuse()?;
     match job {
-        Job::Still(frame, path) => still(session, &look, sources, frame, &path),
-        Job::Pictures(frames, pattern) => Flipbook::open(session, &look, sources, frames)?.pictures(&pattern),
+        Job::Still(frame, path, format) => still(session, &look, sources, frame, (&path, format)),
+        Job::Pictures(frames, pattern, format) => {
+            Flipbook::open(session, &look, sources, frames)?.pictures(&pattern, format)
+        }
         Job::Gif(frames, path) => {
             let fps = sources.fps().or_refuse()?;
             Flipbook::open(session, &look, sources, frames)?.gif(&path, fps)
@@ -143,34 +130,31 @@ fn still(
     look: &Look,
     mut sources: Sources,
     frame: Option<f64>,
-    path: &Path,
+    (path, format): (&Path, PictureFormat),
 ) -> Result<(), Failure> {
     let parts = sources.read(&session.ctx, frame).or_refuse()?;
     let drawing = look.build(&session.ctx, parts).or_refuse()?;
     let view = look.view(std::slice::from_ref(&drawing))?;
-    view.draw(&session.ctx, &drawing).and_then(|picture| picture.write(path)).or_fail()
+    let bytes = view.encoded(&session.ctx, &drawing, format);
+    bytes.and_then(|bytes| atomic::write_bytes(path, &bytes)).or_fail()
 }
 
 impl Args {
     fn look(&self) -> Result<Look, Failure> {
-        if !(1.0..=170.0).contains(&self.fov) {
-            return Err(Failure::refused(format!("--fov {} is not within 1 to 170 degrees", self.fov)));
-        }
-        let camera = match self.eye.zip(self.target) {
-            Some((eye, target)) if eye == target => {
-                return Err(Failure::refused("--eye and --target are the same point"));
-            }
-            Some((eye, target)) => Some(Camera { eye, target, fov_deg: self.fov }),
-            None => None,
-        };
-        let holds_eye = |plane: &Plane| self.eye.is_some_and(|eye| eye[plane.axis] == plane.at);
+        let camera = self.camera.camera()?;
+        let holds_eye = |plane: &Plane| self.camera.eye.is_some_and(|eye| eye[plane.axis] == plane.at);
         if let Some(plane) = self.cut.filter(holds_eye) {
             return Err(Failure::refused(format!("--eye lies in the plane of --cut {plane}")));
         }
-        let light = self.sun.map(|(azimuth, elevation)| Light::from_degrees(azimuth, elevation));
-        let (size, color, fog_density) = (self.size, self.color.clone(), self.fog_density);
-        let tint = self.tint.clone();
-        Ok(Look { size, camera, light, color, tint, cut: self.cut, fog_density })
+        Ok(Look {
+            size: self.camera.size,
+            camera,
+            light: self.camera.light(),
+            color: self.color.clone(),
+            tint: self.tint.clone(),
+            cut: self.cut,
+            fog_density: self.fog_density,
+        })
     }
 
     /// Refuses options that have no effect on these inputs.
@@ -190,10 +174,18 @@ impl Args {
     fn job(&self, sources: &Sources) -> Result<Job, Failure> {
         let path = self.output.clone();
         let refused = |what: &str| Err(Failure::refused(format!("{}: {what}", path.display())));
-        let is_gif = extension(&path) == "gif";
-        // Any other file under that name, especially a shot's, is not a picture.
-        if !is_gif && extension(&path) != "png" && !atomic::is_stream(&path) {
-            return refused("a picture is a .png file, a flipbook a .gif file or a pattern (p.%04d.png)");
+        let (is_gif, format) = match (extension(&path) == "gif", PictureFormat::of(&path)) {
+            (true, _) => (true, PictureFormat::Png),
+            (false, Some(format)) => (false, format),
+            // Any other file under that name, especially a shot's, is not a picture.
+            (false, None) => {
+                return refused(
+                    "a picture is a .png or .exr file, a flipbook a .gif file or a pattern (p.%04d.png)",
+                );
+            }
+        };
+        if format == PictureFormat::Exr && self.cut.is_some() {
+            return refused("--cut draws the colours of numbers, which are not light: choose a .png file");
         }
         if self.fps.is_some() && !is_gif && !sources.has_characters() {
             return refused("--fps is for .gif files and for characters");
@@ -209,7 +201,7 @@ impl Args {
         }
         match (pattern, frames) {
             (Some(_), _) if is_gif => refused("a .gif holds all frames, and has one name"),
-            (Some(pattern), Some(frames)) => Ok(Job::Pictures(frames, pattern)),
+            (Some(pattern), Some(frames)) => Ok(Job::Pictures(frames, pattern, format)),
             (Some(_), None) => refused("a pattern is for several frames: choose them with --frames"),
             (None, Some(frames)) if is_gif => Ok(Job::Gif(frames, path)),
             (None, None) if is_gif => {
@@ -220,7 +212,7 @@ impl Args {
             }
             (None, frames) => {
                 let last = frames.and_then(|frames| frames.last().copied()).map(f64::from);
-                Ok(Job::Still(self.frame.or(last), path))
+                Ok(Job::Still(self.frame.or(last), path, format))
             }
         }
     }
@@ -230,8 +222,8 @@ impl Job {
     /// Refuses frames that a shot lacks, frames of which a sequence has none, and an output that cannot be written.
     fn check(&self, sources: &Sources) -> frazil::Result<()> {
         let (first, frames) = match self {
-            Self::Still(frame, path) => (path.clone(), vec![*frame]),
-            Self::Pictures(frames, pattern) => (pattern.path(frames[0]), as_options(frames)),
+            Self::Still(frame, path, _) => (path.clone(), vec![*frame]),
+            Self::Pictures(frames, pattern, _) => (pattern.path(frames[0]), as_options(frames)),
             Self::Gif(frames, path) => (path.clone(), as_options(frames)),
         };
         output::check_writable(&first)?;

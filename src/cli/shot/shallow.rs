@@ -17,6 +17,9 @@ use crate::cli::session::{Failure, OrFailure, Session};
 /// settings is refused.
 #[derive(clap::Args)]
 #[command(after_help = "\
+Stages:
+  liquid   the liquid of each frame: its surface, its volume, the stained terrain
+
 Examples:
   frazil shallow spill.toml -o spill/
   frazil shallow spill.toml -o honey/ --set shallow.liquid=honey")]

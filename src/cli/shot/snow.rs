@@ -14,6 +14,13 @@ use crate::cli::session::{Failure, OrFailure, Session};
 /// and match are not made again; a folder with frames of other settings is refused.
 #[derive(clap::Args)]
 #[command(after_help = "\
+Stages:
+  base     the layer of snow, and what each frame takes away from it
+  grains   snow that is pushed and thrown, if the scene has a table [grains]
+  mist     powder in the air, if the scene has a table [mist]
+  volumes  fog, level sets and meshes to render, if [output] asks for fog, snow or mesh
+  objects  the objects as they moved, if [output] asks for objects
+
 Examples:
   frazil snow walker.toml -o cache/
   frazil snow walker.toml -o cache/ --from 40 --set snow.noise.seed=2

@@ -16,6 +16,9 @@ use crate::cli::session::{Failure, OrFailure, Session};
 /// filled in. Frames that exist and match are not made again; a folder with frames of other settings is refused.
 #[derive(clap::Args)]
 #[command(after_help = "\
+Stages:
+  surface  the mesh of each frame
+
 Examples:
   frazil surface spot.toml -o out/
   frazil surface -p spot.%04d.bgeo -m spot.ply -o spot/ --fps 25")]

@@ -6,6 +6,7 @@
 
 pub(super) mod declaration;
 pub(super) mod documentation;
+pub(super) mod edited_text;
 mod frames;
 pub(super) mod overrides;
 pub(super) mod shared_keys;

@@ -10,8 +10,10 @@ use crate::error::{Error, Result};
 /// One setting: a dotted key and its value, `object.1.scale=0.01` for the first object.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Override {
-    key: Vec<String>,
-    value: String,
+    /// The parts of the key, at least one; none is empty.
+    pub(super) key: Vec<String>,
+    /// The value as it was typed.
+    pub(super) value: String,
     text: String,
 }
 

@@ -28,9 +28,7 @@ impl Scene {
     /// # Errors
     /// As [`Scene::read`].
     pub fn read_with(path: &Path, overrides: &[Override]) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
-        let text = String::from_utf8(bytes).map_err(|_| Error::file(path, "is not a text file"))?;
-        Self::parse(&text, path, overrides)
+        Self::parse(&text_of(path)?, path, overrides)
     }
 
     /// Reads a scene from text; `path` is its name in messages, and its folder the start of relative paths.
@@ -186,8 +184,14 @@ fn inner_tables(keys: &[Key], table: &str) -> Vec<&'static str> {
     tables(keys).into_iter().filter_map(inner).filter(|name| !name.contains('.')).collect()
 }
 
+/// The text of a scene file.
+pub(super) fn text_of(path: &Path) -> Result<String> {
+    let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
+    String::from_utf8(bytes).map_err(|_| Error::file(path, "is not a text file"))
+}
+
 /// The absolute folder that a scene's relative paths start from.
-fn folder_of(path: &Path) -> Result<PathBuf> {
+pub(super) fn folder_of(path: &Path) -> Result<PathBuf> {
     let absolute = std::path::absolute(path).map_err(|error| Error::io(path, "find", error))?;
     Ok(absolute.parent().unwrap_or(Path::new("/")).to_path_buf())
 }

@@ -3,9 +3,11 @@
 mod file;
 pub(in crate::scene) mod keys;
 mod resolved;
+mod take;
 mod typed;
 
 pub use keys::{reference, template};
+pub use take::Take;
 
 #[cfg(test)]
 mod tests {

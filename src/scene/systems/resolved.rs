@@ -69,7 +69,7 @@ fn lines(key: &Key, value: &Value) -> String {
 }
 
 /// A file's path relative to a folder, if both lie in `home`; folder and home must be free of links.
-fn relative(path: &Path, folder: &Path, home: &Path) -> Option<PathBuf> {
+pub(super) fn relative(path: &Path, folder: &Path, home: &Path) -> Option<PathBuf> {
     let up: PathBuf = folder.strip_prefix(home).ok()?.components().map(|_| "..").collect();
     let parent = path.parent()?.canonicalize().ok()?;
     Some(up.join(parent.strip_prefix(home).ok()?).join(path.file_name()?))

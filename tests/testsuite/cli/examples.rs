@@ -24,7 +24,8 @@ const SIZE: &str = "160x90";
 #[track_caller]
 fn works(folder: &Path, line: &str) -> String {
     let line = line.split(" #").next().unwrap().replace("640x360", SIZE);
-    let draws = line.starts_with("frazil preview") && !line.contains("--size") && !line.contains("--help");
+    let draws = ["frazil preview", "frazil compare"].iter().any(|command| line.starts_with(command));
+    let draws = draws && !line.contains("--size") && !line.contains("--help");
     let size = if draws { &["--size", SIZE][..] } else { &[] };
     // A shell would put the output into the file behind `>`.
     let (line, file) =
@@ -146,6 +147,10 @@ fn the_page_of_the_command_line_runs() {
         works(&folder, &line.replace("cache/", "changes/"));
         count += 1;
     }
+    for line in lines(block(CLI, "## Takes", "sh")) {
+        works(&folder, line);
+        count += 1;
+    }
     for line in lines(block(CLI, "## Farms", "sh")) {
         works(&folder, line);
         count += 1;
@@ -155,7 +160,7 @@ fn the_page_of_the_command_line_runs() {
         works(&folder, &line.replace(" -o shot.gif", " --frames 1-120x40 -o shot.gif"));
         count += 1;
     }
-    assert_eq!(count, 18);
+    assert_eq!(count, 22);
 }
 
 /// Two frames of points.
