@@ -224,7 +224,14 @@ fn a_replaced_base_file_and_frames_to_start_from_are_named_as_they_are() {
     works(at, "snow shot.toml -o out -q --frames 1-6 --set shot.frames=1-6");
     // Of the grains only the last two frames are kept exactly; there is no frame 7.
     let from = "snow shot.toml -o out -q --stage grains --from 4 --set shot.frames=1-6";
-    fails(at, from, 2, &["(state/ keeps those of the last two frames): --from 6, --from 1 or another -o"]);
+    fails(
+        at,
+        from,
+        2,
+        &[
+            "(state/ keeps those of the last two frames; `output.keep_states` keeps more): --from 6, --from 1 or another -o",
+        ],
+    );
     let none = report(at, 1).get("owed").cloned();
     assert!(none.is_none());
     fs::copy(at.join("out/base/base.0004.vdb"), at.join("out/base/base.0003.vdb")).unwrap();

@@ -6,9 +6,18 @@ use std::path::Path;
 use crate::common::character::output;
 use crate::program::{CUBE, Folder, fails, kill_at, works};
 
-/// A folder with a cube that slides through snow; `grains` and `output` stand in the scene's tables.
+/// The keys of `[output]` that leave out files for other programs, but for those that `output` has itself.
+fn without_usd(output: &str) -> String {
+    let is_missing =
+        |(key, _): &(&str, &str)| !output.lines().any(|line| line.starts_with(&format!("{key} =")));
+    let keys = [("grains", "[\"vdb\"]"), ("mesh", "[]"), ("objects", "[]")].into_iter().filter(is_missing);
+    keys.map(|(key, value)| format!("{key} = {value}\n")).collect::<String>() + output
+}
+
+/// A folder with a cube that slides through snow; `grains` and `output` stand in the scene's tables. Nothing is written for other programs
+/// that `output` does not ask for.
 pub fn folder(grains: &str, output: &str) -> Folder {
-    let folder = Folder::empty();
+    let (folder, output) = (Folder::empty(), without_usd(output));
     fs::write(folder.join("cube.obj"), CUBE).unwrap();
     let scene = format!(
         "[shot]\nframes = \"1-10\"\n[snow]\nground = 0.0\narea = [-0.5, -0.5, 0.5, 1.0]\ndepth = 0.2\ncell = 0.02\n\

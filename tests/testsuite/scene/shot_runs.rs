@@ -78,12 +78,13 @@ fn a_second_run_makes_nothing_again() {
     let stamp = |name: &str| fs::metadata(folder.join(name)).unwrap().modified().unwrap();
     let before = stamp("out/base/base.0002.vdb");
     let said = works(&folder, "snow shot.toml -o out");
-    assert!(said.contains("4 frames exist, 0 are to be made"), "{said}");
+    // Of the base, its mesh and the object.
+    assert!(said.contains("12 frames exist, 0 are to be made"), "{said}");
     assert_eq!(before, stamp("out/base/base.0002.vdb"));
     // A frame that is gone is made again, and only that one.
     fs::remove_file(folder.join("out/removed/removed.0003.vdb")).unwrap();
     let said = works(&folder, "snow shot.toml -o out");
-    assert!(said.contains("3 frames exist, 1 are to be made"), "{said}");
+    assert!(said.contains("11 frames exist, 1 are to be made"), "{said}");
     assert_eq!(before, stamp("out/base/base.0002.vdb"));
 }
 
@@ -209,7 +210,7 @@ fn damaged_records_and_files_are_named() {
     }
     fs::remove_file(path("state/base.0003.json")).unwrap();
     let said = works(&folder, "snow shot.toml -o out");
-    assert!(said.contains("3 frames exist, 1 are to be made"), "{said}");
+    assert!(said.contains("11 frames exist, 1 are to be made"), "{said}");
     // The length is right, the content is not: no run resumes from it.
     let mut bytes = fs::read(path("base/base.0003.vdb")).unwrap();
     let middle = bytes.len() / 2;
