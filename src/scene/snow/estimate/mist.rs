@@ -72,7 +72,7 @@ impl MistForecast {
         let last = scene.shot.frames.last;
         let existing = stored.map(|stored| existing_cells(stored, params.cell, last)).transpose()?.flatten();
         let of_frames = match existing {
-            Some((_, cells)) => vec![cells; scene.shot.frames.count() as usize],
+            Some((_, cells)) => vec![cells; scene.shot.frames.count()],
             None => cells_in_boxes(ctx, scene, paths, &params)?,
         };
         // The maximum number of cells at one time, and the sum over all frames.
