@@ -25,10 +25,12 @@ fn folder(tables: &str) -> Folder {
     folder
 }
 
-/// The files of a folder by name, but those that an earlier version did not write or that describe all frames.
+/// The files of a folder's frames from one on, by name; without states, of which only the last ones are kept.
 fn of_frames(folder: &Path, from: i32) -> Vec<(String, Vec<u8>)> {
     let frame = |name: &str| -> Option<i32> { name.split('.').nth(1)?.parse().ok() };
-    output(folder).into_iter().filter(|(name, _)| frame(name).is_some_and(|frame| frame >= from)).collect()
+    let is_wanted =
+        |name: &str| !name.starts_with("state/") && frame(name).is_some_and(|frame| frame >= from);
+    output(folder).into_iter().filter(|(name, _)| is_wanted(name)).collect()
 }
 
 #[test]
