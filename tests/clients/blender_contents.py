@@ -15,7 +15,8 @@ import numpy as np
 
 folder = pathlib.Path(sys.argv[1]).resolve()
 bpy.ops.wm.read_factory_settings(use_empty=True)
-bpy.ops.wm.usd_import(filepath=str(folder / "shot.usda"))
+# By default a mesh takes the place of a parent that has no other child, and its path is then another.
+bpy.ops.wm.usd_import(filepath=str(folder / "shot.usda"), merge_parent_xform=False)
 
 
 def path_of(thing):
