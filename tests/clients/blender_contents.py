@@ -30,13 +30,13 @@ objects = {path_of(thing): thing for thing in bpy.data.objects}
 volumes = {"fog": lambda grid: f"fog_{grid}", "volume": lambda grid: "liquid_volume"}
 
 
-def positions(data):
-    """Positions of the vertices of a mesh or the points of a cloud."""
-    count = len(data.attributes["position"].data) if "position" in data.attributes else 0
-    found = np.zeros(3 * count, np.float32)
+def numbers(data, name, field, width):
+    """An attribute of the vertices of a mesh or the points of a cloud, in rows."""
+    count = len(data.attributes[name].data) if name in data.attributes else 0
+    found = np.zeros(width * count, np.float32)
     if count:
-        data.attributes["position"].data.foreach_get("vector", found)
-    return found.reshape(-1, 3)
+        data.attributes[name].data.foreach_get(field, found)
+    return found.reshape(-1, width)
 
 
 def is_close(box, other, error):
@@ -59,13 +59,15 @@ def differences(kind, name, held, graph):
         if held["extent_m"] is not None and data.grids.load() and name not in [grid.name for grid in data.grids]:
             yield f"has the grids {[grid.name for grid in data.grids]}"
         return
-    where = positions(data)
+    where, radii = numbers(data, "position", "vector", 3), numbers(data, "radius", "value", 1)
     if len(where) != held["points"]:
         yield f"has {len(where)} points, not {held['points']}"
     if "faces" in held and len(data.polygons) != held["faces"]:
         yield f"has {len(data.polygons)} faces, not {held['faces']}"
     if len(where) and held["extent_m"] is not None and held.get("faces", 1):
-        box = [where.min(axis=0), where.max(axis=0)]
+        # Only points have radii.
+        around = radii if len(radii) else np.zeros((len(where), 1))
+        box = [(where - around).min(axis=0), (where + around).max(axis=0)]
         if not is_close(box, held["extent_m"], 1e-5):
             yield f"lies in {box}, not {held['extent_m']}"
 
