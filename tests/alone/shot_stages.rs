@@ -18,7 +18,7 @@ use frazil::scene::{FrameChoice, Inputs, Scene, snow};
 use frazil::{Context, Error, Pool, Result};
 
 const SCENE: &str = "[shot]\nframes = \"1-8\"\n[snow]\nground = 0.0\narea = [-0.5, -0.5, 0.5, 1.5]\ndepth = 0.3\n\
-                     cell = 0.04\n[output]\nobjects = [\"ply\"]\n[[object]]\nfile = \"cube.obj\"\n\
+                     cell = 0.04\n[output]\nmesh = []\nobjects = [\"ply\"]\n[[object]]\nfile = \"cube.obj\"\n\
                      keys = [{ frame = 1, at = [0, 0.1, 0] }, { frame = 8, at = [0, 0.1, 0.9] }]\n";
 
 /// Adds up the lengths of the base's files, each weighted.
