@@ -33,7 +33,11 @@ fn files_of(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 /// Whether files of the frames that an earlier version did not make are the same, and all of these are there.
 fn is_continued(whole: &BTreeMap<PathBuf, Vec<u8>>, other: &BTreeMap<PathBuf, Vec<u8>>) -> bool {
     let frame = |path: &Path| -> Option<i32> { path.file_stem()?.to_str()?.rsplit('.').next()?.parse().ok() };
-    let later = |(path, _): &(&PathBuf, &Vec<u8>)| frame(path).is_some_and(|frame| frame > EARLIER);
+    // The .vdb files of grains and mist hold a hash of the settings that the folder began with.
+    let is_free =
+        |path: &Path| path.starts_with("base") || path.extension().is_some_and(|name| name == "usdc");
+    let later =
+        |(path, _): &(&PathBuf, &Vec<u8>)| is_free(path) && frame(path).is_some_and(|frame| frame > EARLIER);
     whole.iter().filter(later).all(|(path, bytes)| other.get(path) == Some(bytes))
 }
 

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use frazil::vdb::AnyGrid;
 use serde_json::json;
 
 use crate::common::character::output;
@@ -71,7 +72,7 @@ fn a_shot_writes_no_mesh_of_a_base_that_is_not_exact_and_no_objects_without_any(
 
 #[test]
 fn the_folder_of_a_shot_with_the_former_defaults_is_continued() {
-    let at = &folder("[grains]\n[mist]");
+    let at = &folder("[grains]\n[mist]\nfrom_speed = 0.1");
     works(at, &format!("snow shot.toml -o former -q --frames 1-6 {FORMER}"));
     let before = of_frames(&at.join("former"), 0);
     works(at, "snow shot.toml -o former -q");
@@ -79,12 +80,22 @@ fn the_folder_of_a_shot_with_the_former_defaults_is_continued() {
     let after = of_frames(&at.join("former"), 0);
     let is_kept = |file: &(String, Vec<u8>)| after.contains(file);
     assert!(before.iter().all(is_kept));
-    // From frame 7 on all is as in a whole shot, and what reads the base is made of all frames.
+    // From frame 7 on all is as in a whole shot, and what reads the base is made of all frames. The .vdb files of grains and mist hold a hash
+    // of the settings that the folder began with.
     let later = |folder: &str| -> Vec<_> {
         let files = of_frames(&at.join(folder), 7).into_iter();
-        files.filter(|(name, _)| !name.ends_with(".json")).collect()
+        files.filter(|(name, _)| name.ends_with(".usdc") || name.starts_with("base/")).collect()
     };
+    assert_eq!(later("whole").len(), 4 * 6);
     assert!(later("former") == later("whole"));
+    let mist = |folder: &str| {
+        let file = at.join(folder).join("mist/mist.0012.vdb");
+        match frazil::vdb::file::read_any(&file, Some("density")).unwrap() {
+            AnyGrid::Floats(grid) => frazil::vdb::file::to_bytes(&[&grid], &Default::default()).unwrap(),
+            AnyGrid::Vectors(_) => panic!("a density of vectors"),
+        }
+    };
+    assert!(mist("former") == mist("whole"));
     assert!(
         at.join("former/mesh/mesh.0001.usdc").is_file()
             && at.join("former/objects/objects.0001.usdc").is_file()
