@@ -102,7 +102,10 @@ impl Made {
             frazil(["check", "--json"]).arg(shot.scene(scenes)).arg("-o").arg(folder.join("none")).output();
         let checked: serde_json::Value =
             serde_json::from_slice(&checked.expect("frazil").stdout).expect("JSON");
-        let forecast = checked["memory_forecast_bytes"].as_f64().expect("a forecast of memory");
+        let memory = |part: &serde_json::Value| part["memory_bytes"].as_f64();
+        // That of the mist is counted apart.
+        let of_mist = checked.get("mist").and_then(memory).unwrap_or_default();
+        let forecast = memory(&checked).expect("an estimate of memory").max(of_mist);
         Self { name: shot.name, folder: out, progress, seconds, memory: [peak, forecast] }
     }
 }
