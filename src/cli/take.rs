@@ -12,9 +12,8 @@ use super::shell::quoted;
 
 /// Copy a scene with settings into a folder beside it.
 ///
-/// Writes NAME/SCENE beside the scene, with the settings in the places of the values that they override, and with all comments. It makes
-/// the same output as SCENE with these settings: relative paths are changed so that they name the same files. Prints the command that
-/// runs it.
+/// Writes NAME/SCENE beside the scene: each setting replaces the value that it overrides, and all comments stay. The copy makes the same
+/// output as SCENE with these settings: relative paths are changed so that they name the same files. Prints the command that runs it.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -73,7 +72,7 @@ fn prepare(folder: &Path) -> Result<bool> {
             Ok(true)
         }
         Err(error) => Err(io("read")(error)),
-        // The way back from a link's target would not lead to the scene.
+        // `..` in front of a path would lead beside a link's target, not to the scene.
         Ok(metadata) if !metadata.is_dir() => {
             Err(Error::file(folder, "exists and is not a folder: choose another name"))
         }

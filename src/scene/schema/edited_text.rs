@@ -14,7 +14,7 @@ pub struct EditedText {
 }
 
 impl EditedText {
-    /// Reads TOML; none if it is not.
+    /// Parses TOML; `None` if the text is not TOML.
     pub fn parse(text: &str) -> Option<Self> {
         let document = text.parse().ok()?;
         Some(Self { document, has_carriage_returns: text.contains("\r\n") })
@@ -26,7 +26,7 @@ impl EditedText {
         if self.has_carriage_returns { text.replace("\r\n", "\n").replace('\n', "\r\n") } else { text }
     }
 
-    /// Writes a setting in the place of the value that it overrides, or behind the last key of its table; none if it cannot be applied.
+    /// Replaces the value that a setting overrides, or adds it after the last key of its table; `None` if it cannot be applied.
     pub fn set(&mut self, setting: &Override) -> Option<()> {
         // As when a setting is applied: a value that is not TOML is a text.
         let is_toml = DeValue::parse(&setting.value).is_ok();
