@@ -279,7 +279,7 @@ pub struct Output {
     pub objects_usd: bool,
     /// `objects/objects.%04d.ply`: the same, all in one mesh.
     pub objects_ply: bool,
-    /// The exact states of grains and mist that are kept: of every which frame; 0 = only of the last ones.
+    /// How often the exact states of grains and mist are kept: after every Nth frame; 0 = only after the last ones.
     pub keep_states: i32,
     /// `shot.usda`.
     pub usd: bool,

@@ -37,7 +37,7 @@ fn sun(text: &str) -> Result<(f64, f64), String> {
 }
 
 impl CameraOptions {
-    /// The chosen camera; none if it is placed automatically.
+    /// The chosen camera; `None` for the automatic one.
     ///
     /// # Errors
     /// A field of view out of range; a camera that looks at its own position.
@@ -54,7 +54,7 @@ impl CameraOptions {
         }
     }
 
-    /// The chosen light; none if it stands beside the camera.
+    /// The chosen light; `None` for the sun beside the camera.
     pub fn light(&self) -> Option<Light> {
         self.sun.map(|(azimuth, elevation)| Light::from_degrees(azimuth, elevation))
     }

@@ -15,7 +15,7 @@ pub enum PictureFormat {
 }
 
 impl PictureFormat {
-    /// The format by a file's name; a device or a pipe gets a PNG. None for other names.
+    /// The format by a file's name; a device or a pipe gets a PNG. `None` for other names.
     pub fn of(path: &Path) -> Option<Self> {
         match extension(path).as_str() {
             "exr" => Some(Self::Exr),

@@ -88,7 +88,7 @@ pub struct Work<'a> {
     pub upstream: &'a [DoneFrames],
     /// The frames to make, ascending.
     pub todo: &'a [i32],
-    /// The exact states that are kept: of every which frame, from the first on; 0 = only of the last ones.
+    /// How often the exact state is kept: after every Nth frame from the first; 0 = only after the last ones.
     pub states_every: i32,
 }
 

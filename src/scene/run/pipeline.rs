@@ -69,8 +69,8 @@ impl Pipeline<'_> {
         Ok(())
     }
 
-    /// The exact states of a stage that are kept: of every which frame, from the first on; 0 = only of the last ones. All are, if the stage
-    /// requires that or another one reads them.
+    /// How often the exact state of a stage is kept: after every Nth frame from the first; 0 = only after the last ones. After every frame if
+    /// the stage requires it or another stage reads the states.
     pub(super) fn states_kept_every(&self, of: &dyn Stage) -> i32 {
         let reads =
             |stage: &dyn Stage| stage.upstream().contains(&of.name()) && stage.reads_state_of(of.name());

@@ -26,7 +26,7 @@ pub const OUTPUT_KEYS: &[Key] = &[
         .means("mist/mist.%04d.vdb: density, and vel (m/s) at the cells' centres; [] = none"),
     key(MIST, "output", "mist_half", Flag, or("true")).means("the mist in 16-bit values, as renderers use them; false = 32 bits"),
     key(MIST, "output", "names", Choice(&["houdini", "blender"]), or("\"houdini\""))
-        .means("the program whose name the grid of the mist's velocity has: `vel`, or `velocity` for Blender's motion blur"),
+        .means("name of the mist's grid of velocities: `vel`, which Houdini looks for, or `velocity`, for Blender's motion blur"),
     key(VOLUMES, "output", "fog", Choices(&["base", "grains", "mist"]), or("[]"))
         .means("fog/fog.%04d.vdb: densities for rendering, a grid for each of these (see docs/snow.md)"),
     key(VOLUMES, "output", "snow", Flag, or("false"))
@@ -38,5 +38,5 @@ pub const OUTPUT_KEYS: &[Key] = &[
     key(OBJECTS, "output", "objects", Choices(&["usd", "ply"]), or("[\"usd\"]"))
         .means("\"usd\", \"ply\": objects/, the moving objects, with velocities"),
     key(&[], "output", "keep_states", Whole(0, 1_000_000), or("0"))
-        .means("exact states of grains and mist are kept every N frames, so that `--from` goes back at most N; 0 = those of the last two"),
+        .means("keeps the exact states of grains and mist every N frames, so that `--from` goes back at most N; 0 = only those of the last two"),
 ];
