@@ -45,7 +45,7 @@ demo: setup-build
 	target/release/frazil snow $(DEMO)/ball.toml -o $(DEMO)/ball
 	target/release/frazil preview $(DEMO)/ball/base/base.0024.vdb -o $(DEMO)/ball.png
 	target/release/frazil snow $(DEMO)/plough.toml -o $(DEMO)/plough
-	target/release/frazil preview $(DEMO)/plough/base/base.0022.vdb $(DEMO)/plough/grains/grains.0022.vdb $(DEMO)/plough/objects/objects.0022.usdc -o $(DEMO)/plough.png --eye -0.95,0.85,0.75 --target 0.1,0.3,0.0 --sun 60,22
+	target/release/frazil preview $(DEMO)/plough/base/base.0022.vdb $(DEMO)/plough/grains/grains.0022.usdc $(DEMO)/plough/objects/objects.0022.usdc -o $(DEMO)/plough.png --eye -0.95,0.85,0.75 --target 0.1,0.3,0.0 --sun 60,22
 	target/release/frazil check $(DEMO)/liquid.toml
 	target/release/frazil surface $(DEMO)/liquid.toml -o $(DEMO)/liquid
 	target/release/frazil vdb from-particles $(DEMO)/liquid.%04d.bgeo --frames 1-36 --spacing 0.0125 --mesh $(DEMO)/liquid_plain.%04d.ply

@@ -1,4 +1,4 @@
-//! The machine's memory, as Linux reports it.
+//! The machine's memory, as Linux reports it, and what this process has of it.
 
 /// Bytes that this process may use: the machine's memory, or its control group's limit if that is less.
 pub fn machine_memory() -> Option<u64> {
@@ -11,6 +11,26 @@ pub fn machine_memory() -> Option<u64> {
 /// Peak memory of this process (bytes), if the system reports it.
 pub fn peak_memory() -> Option<u64> {
     kilobytes_of(&std::fs::read_to_string("/proc/self/status").ok()?, "VmHWM:")
+}
+
+/// Gives memory that this process has freed back to the system: glibc keeps most of it for each thread that allocated it.
+pub fn release_freed_memory() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    // SAFETY: it may be called from any thread at any time.
+    unsafe {
+        libc::malloc_trim(0);
+    }
+}
+
+/// For a program that runs for long: large arrays that are freed go back to the system at once. By default, glibc keeps arrays of up to 32 MB
+/// for each thread that allocated them, up to three times what is in use; this costs some 2 % of the time. A library leaves it to its program.
+pub fn return_large_arrays() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    // SAFETY: it may be called from any thread at any time.
+    unsafe {
+        const MEGABYTE: i32 = 1 << 20;
+        libc::mallopt(libc::M_MMAP_THRESHOLD, MEGABYTE);
+    }
 }
 
 /// The line `NAME   1234 kB` in bytes.

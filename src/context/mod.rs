@@ -15,7 +15,8 @@ use std::time::{Duration, Instant};
 use locking::lock;
 
 pub use cancel::Running;
-pub use memory::{machine_memory, peak_memory};
+pub(crate) use memory::release_freed_memory;
+pub use memory::{machine_memory, peak_memory, return_large_arrays};
 pub use phases::{PhaseTime, Phases};
 pub use pool::{MAX_THREADS, Pool};
 pub use progress::Progress;

@@ -50,6 +50,9 @@ const AZIMUTH_DEG: f64 = 35.0;
 /// Elevation of the automatic camera above the horizon (degrees).
 const ELEVATION_DEG: f64 = 33.0;
 
+/// Margin around what moves, as a share of its size along x and z and of its height.
+const SURROUNDINGS: f64 = 0.15;
+
 impl Camera {
     /// A three-quarter view from above with the whole box in the picture.
     pub fn framing(bounds: (DVec3, DVec3), size: Size) -> Self {
@@ -59,6 +62,13 @@ impl Camera {
         let mut camera = Self { eye: toward_eye, target: DVec3::zeros(), fov_deg: FOV_DEG };
         camera.look_from(bounds, toward_eye, size);
         camera
+    }
+
+    /// Grows a box around what moves (m) by a share of its size, so that a view that frames it shows its surroundings too.
+    pub fn surroundings((low, high): (DVec3, DVec3)) -> (DVec3, DVec3) {
+        let extent = high - low;
+        let margin = SURROUNDINGS * DVec3::new(extent.x, 0.0, extent.z).add_scalar(extent.y);
+        (low - margin, high + margin)
     }
 
     /// A view straight at a plane, from the side to which its axis points, with the whole box in the picture. Upward in the picture

@@ -34,7 +34,8 @@ pub use schema::{FrameChoice, Frames, Override, Value, Values};
 pub use shallow::Shallow;
 #[cfg(feature = "vdb")]
 pub use snow::{
-    FootSlip, Forecast, Inputs, Rebuild, RebuildGrains, changes_since, check_memory, estimate, partial,
+    FootSlip, Forecast, Inputs, MovingObjects, Rebuild, RebuildGrains, changes_since, check_memory, estimate,
+    partial,
 };
 pub use surface::Surface;
 pub use systems::{Take, reference, template};
@@ -441,6 +442,11 @@ impl Output {
     /// Whether a run can resume from the files of the base alone.
     pub fn base_restarts(&self) -> bool {
         self.inexact_base().is_none()
+    }
+
+    /// Whether other stages can read the grains from their files.
+    pub(crate) fn grains_readable(&self) -> bool {
+        self.grains_vdb || self.grains_usd
     }
 
     /// The key that keeps exact values out of the base's files, if one does.

@@ -102,10 +102,7 @@ impl Made {
             frazil(["check", "--json"]).arg(shot.scene(scenes)).arg("-o").arg(folder.join("none")).output();
         let checked: serde_json::Value =
             serde_json::from_slice(&checked.expect("frazil").stdout).expect("JSON");
-        let memory = |part: &serde_json::Value| part["memory_bytes"].as_f64();
-        // That of the mist is counted apart.
-        let of_mist = checked.get("mist").and_then(memory).unwrap_or_default();
-        let forecast = memory(&checked).expect("an estimate of memory").max(of_mist);
+        let forecast = checked["memory_forecast_bytes"].as_f64().expect("a forecast of memory");
         Self { name: shot.name, folder: out, progress, seconds, memory: [peak, forecast] }
     }
 }

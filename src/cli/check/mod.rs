@@ -9,9 +9,12 @@ mod surface;
 use std::fmt::Write;
 use std::path::PathBuf;
 
+use frazil::geometry::DVec3;
+use frazil::render::{Camera, Size};
 use frazil::scene::run::verify::{Verified, verify};
 use frazil::scene::{Override, Scene, System};
 use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::output;
 use super::session::{Failure, OrFailure, Session};
@@ -37,6 +40,9 @@ pub struct Args {
     #[arg(long)]
     json: bool,
 }
+
+/// The size of picture that a camera is proposed for: the default of `frazil preview`.
+const SIZE: Size = Size { width: 1280, height: 720 };
 
 impl Args {
     /// Free bytes on the disk of the output.
@@ -74,6 +80,11 @@ fn free_in_words(free: Option<u64>) -> String {
     free.map_or(String::new(), |free| format!(" of {} free", size(free)))
 }
 
+/// The memory that is expected to be taken, and the bound by which a run is refused (bytes).
+fn memory_in_words([expected, bound]: [u64; 2], limit: u64) -> String {
+    format!("about {} expected, at most {} of {}", size(expected), size(bound), size(limit))
+}
+
 fn warnings_in_words(warnings: &[String]) -> String {
     warnings.iter().map(|warning| format!("warning   {warning}\n")).collect()
 }
@@ -89,12 +100,48 @@ fn warn_of_space(warnings: &mut Vec<String>, how: &str, needed: Option<u64>, fre
 
 /// Prints a report, in words or as JSON.
 fn print(args: &Args, report: &impl Serialize, in_words: impl FnOnce() -> String) -> Result<(), Failure> {
+    let text = if args.json { in_json(to_json(report)) } else { in_words() };
+    output::print(&text).or_fail()
+}
+
+/// Prints the forecast of a scene, as [`print`] does, with a camera that sees a box (m) around what the shot shows, if that is known, and
+/// with warnings.
+fn print_forecast(
+    args: &Args,
+    (report, warnings): (&impl Serialize, &[String]),
+    seen: Option<(DVec3, DVec3)>,
+    in_words: impl FnOnce() -> String,
+) -> Result<(), Failure> {
+    let camera = seen.map(|seen| Camera::framing(Camera::surroundings(seen), SIZE));
     let text = if args.json {
-        format!("{:#}\n", serde_json::to_value(report).expect("plain values become JSON"))
+        let mut report = to_json(report);
+        report["camera"] = camera.map_or(Value::Null, |Camera { eye, target, fov_deg }| {
+            json!({ "eye_m": eye.as_slice(), "target_m": target.as_slice(), "fov_deg": fov_deg })
+        });
+        in_json(report)
     } else {
-        in_words()
+        let camera = camera.map_or(String::new(), |camera| camera_in_words(&camera));
+        in_words() + &camera + &warnings_in_words(warnings)
     };
     output::print(&text).or_fail()
+}
+
+fn to_json(report: &impl Serialize) -> Value {
+    serde_json::to_value(report).expect("plain values become JSON")
+}
+
+fn in_json(report: Value) -> String {
+    format!("{report:#}\n")
+}
+
+/// The options of `frazil preview` for a camera.
+fn camera_in_words(camera: &Camera) -> String {
+    let point = |at: DVec3| {
+        let [x, y, z] = [at.x, at.y, at.z].map(|x| format!("{x:.3}"));
+        format!("{x},{y},{z}")
+    };
+    let (eye, target) = (point(camera.eye), point(camera.target));
+    format!("camera    --eye={eye} --target={target} --fov {} sees the whole shot\n", camera.fov_deg)
 }
 
 /// Runs the command.

@@ -2,11 +2,13 @@
 
 use std::fmt::Write;
 
+use frazil::geometry::DVec3;
 use frazil::scene::Scene;
 use frazil::scene::shallow::{Inputs, Report, check};
 
 use super::{
-    Args, frames_in_words, free_in_words, print, refuse_preview, size, warn_of_space, warnings_in_words,
+    Args, frames_in_words, free_in_words, memory_in_words, print_forecast, refuse_preview, size,
+    warn_of_space,
 };
 use crate::cli::session::{Failure, OrFailure, Session};
 
@@ -23,7 +25,9 @@ pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure>
     }
     let free = args.free_space();
     warn_of_space(&mut report.warnings, "may need", Some(report.disk_bytes), free);
-    print(args, &report, || in_words(&report, limit, free))
+    let ([x0, z0, x1, z1], [low, high]) = (report.area_m, report.heights_m);
+    let seen = (DVec3::new(x0, low, z0), DVec3::new(x1, high, z1));
+    print_forecast(args, (&report, &report.warnings), Some(seen), || in_words(&report, limit, free))
 }
 
 fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
@@ -59,9 +63,13 @@ fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
     if !report.scalars.is_empty() {
         let _ = writeln!(out, "carries   {}", report.scalars.join(", "));
     }
-    let _ = writeln!(out, "memory    about {} of {}", size(report.memory_bytes), size(limit));
+    let _ = writeln!(
+        out,
+        "memory    {}",
+        memory_in_words([report.memory_forecast_bytes, report.memory_bytes], limit)
+    );
     let free = free_in_words(free);
     let each = size(report.frame_bytes);
     let _ = writeln!(out, "disk      at most {}{free}; {each} a frame", size(report.disk_bytes));
-    out + &warnings_in_words(&report.warnings)
+    out
 }

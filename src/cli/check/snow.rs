@@ -2,11 +2,14 @@
 
 use std::fmt::Write;
 
+use frazil::geometry::DVec3;
 use frazil::scene::snow::MistForecast;
 use frazil::scene::snow::check::{ObjectReport, Report, check};
 use frazil::scene::{Inputs, Scene, System, check_memory};
 
-use super::{Args, frames_in_words, free_in_words, print, size, surface, warn_of_space, warnings_in_words};
+use super::{
+    Args, frames_in_words, free_in_words, memory_in_words, print_forecast, size, surface, warn_of_space,
+};
 use crate::cli::session::{Failure, OrFailure, Session};
 
 /// Checks the scene.
@@ -33,7 +36,17 @@ pub fn run(args: &Args, session: &Session, mut scene: Scene) -> Result<(), Failu
     let mist_bytes = report.mist.as_ref().map_or(0, |mist| mist.disk_bytes);
     let needed = report.disk_bytes.map(|bytes| bytes.saturating_add(mist_bytes));
     warn_of_space(&mut report.warnings, "need about", needed, free);
-    print(args, &report, || in_words(&report, limit, free))
+    print_forecast(args, (&report, &report.warnings), seen(&report), || in_words(&report, limit, free))
+}
+
+/// The corners of a box around the objects over the shot, as far as they are above the snow or in it (m).
+fn seen(report: &Report) -> Option<(DVec3, DVec3)> {
+    let corners = report.objects.iter().map(|object| object.bounds_m.map(DVec3::from));
+    let [low, high] = corners.reduce(|a, b| [a[0].inf(&b[0]), a[1].sup(&b[1])])?;
+    let [x0, z0, x1, z1] = report.area_m.unwrap_or([low.x, low.z, high.x, high.z]);
+    let low = DVec3::new(low.x.max(x0), low.y, low.z.max(z0));
+    let high = DVec3::new(high.x.min(x1), high.y, high.z.min(z1));
+    (low.x < high.x && low.z < high.z).then_some((low, high))
 }
 
 fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
@@ -49,11 +62,12 @@ fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
         describe_mist(&mut out, mist, limit);
     }
     let mist = if report.mist.is_some() { ", without mist" } else { "" };
-    let _ = writeln!(out, "memory    about {} of {}{mist}", size(report.memory_bytes), size(limit));
+    let memory = [report.memory_forecast_bytes, report.memory_bytes];
+    let _ = writeln!(out, "memory    {}{mist}", memory_in_words(memory, limit));
     if let Some(disk) = report.disk_bytes {
         let _ = writeln!(out, "disk      about {}{}{mist}", size(disk), free_in_words(free));
     }
-    out + &warnings_in_words(&report.warnings)
+    out
 }
 
 fn describe_grains(out: &mut String, report: &Report) {
@@ -66,12 +80,17 @@ fn describe_grains(out: &mut String, report: &Report) {
         return;
     };
     let (removed, share) = (grains.removed_m3, grains.compression);
-    let upto = match (grains.to_frame, report.frames[1]) {
-        (frame, last) if frame == last => String::new(),
-        (frame, last) => format!(" up to frame {frame} of {last}, as far as the base exists"),
+    let last = report.frames[1];
+    let by = match grains.base_to_frame {
+        None => ", by the poses of objects".to_string(),
+        Some(frame) if frame == last => String::new(),
+        Some(frame) if frame == grains.to_frame => {
+            format!(" up to frame {frame} of {last}, as far as the base exists")
+        }
+        Some(frame) => format!(", by the poses of objects after frame {frame}, the base's last"),
     };
-    let _ = writeln!(out, "grains    {}{upto}", grains.count());
-    let _ = writeln!(out, "          from {removed:.6} m3 of the base, compression {share}");
+    let _ = writeln!(out, "grains    {}{by}", grains.count());
+    let _ = writeln!(out, "          from {removed:.6} m3 of snow, compression {share}");
 }
 
 fn describe_mist(out: &mut String, mist: &MistForecast, limit: u64) {

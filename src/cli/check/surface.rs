@@ -2,11 +2,13 @@
 
 use std::fmt::Write;
 
+use frazil::geometry::DVec3;
 use frazil::scene::Scene;
 use frazil::scene::surface::{Inputs, Report, check};
 
 use super::{
-    Args, frames_in_words, free_in_words, print, refuse_preview, size, warn_of_space, warnings_in_words,
+    Args, frames_in_words, free_in_words, memory_in_words, print_forecast, refuse_preview, size,
+    warn_of_space,
 };
 use crate::cli::session::{Failure, OrFailure, Session};
 
@@ -27,7 +29,8 @@ pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure>
     }
     let free = args.free_space();
     warn_of_space(&mut report.warnings, "need about", Some(report.disk_bytes), free);
-    print(args, &report, || in_words(&report, limit, free))
+    let [low, high] = report.particles_bounds_m.map(DVec3::from);
+    print_forecast(args, (&report, &report.warnings), Some((low, high)), || in_words(&report, limit, free))
 }
 
 fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
@@ -55,8 +58,12 @@ fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
     );
     let _ = writeln!(out, "          {width:.3} x {height:.3} x {depth:.3} m (x, y, z) at the first frame");
     let free = free_in_words(free);
-    let _ = writeln!(out, "memory    about {} of {}", size(report.memory_bytes), size(limit));
+    let _ = writeln!(
+        out,
+        "memory    {}",
+        memory_in_words([report.memory_forecast_bytes, report.memory_bytes], limit)
+    );
     let each = size(report.frame_bytes);
     let _ = writeln!(out, "disk      about {}{free}; {each} a frame", size(report.disk_bytes));
-    out + &warnings_in_words(&report.warnings)
+    out
 }

@@ -6,6 +6,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use frazil::Context;
+use frazil::geometry::DVec3;
 use frazil::io::files::atomic;
 use frazil::io::mesh::extension;
 use frazil::render::Picture;
@@ -60,7 +61,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let [a, b] = &mut sources;
     let drawings = [a, b].map(|folder| draw(&session.ctx, &look, folder, at));
     let [a, b] = drawings;
-    let picture = join(&session.ctx, &look, [a.or_refuse()?, b.or_refuse()?])?;
+    let focus = sources.each_mut().map(|folder| look.wanted_focus(folder));
+    let picture = join(&session.ctx, &look, [a.or_refuse()?, b.or_refuse()?], focus)?;
     picture.write(&args.output).or_fail()?;
     session.record("frame", frame.into());
     session.record("differences", in_json(&found));
@@ -122,9 +124,16 @@ fn draw(ctx: &Context, look: &Look, folder: &mut Sources, frame: Option<f64>) ->
     look.build(ctx, folder.read(ctx, frame)?)
 }
 
-/// Draws two frames, with one camera that sees all of both.
-fn join(ctx: &Context, look: &Look, drawings: [Drawing; 2]) -> Result<Picture, Failure> {
-    let view = look.view(&drawings)?;
+/// Draws two frames, with one camera that sees the focus of both, or all of both.
+fn join(
+    ctx: &Context,
+    look: &Look,
+    drawings: [Drawing; 2],
+    focus: [Option<[DVec3; 2]>; 2],
+) -> Result<Picture, Failure> {
+    let [a, b] = focus;
+    let both = a.zip(b).map(|([a, b], [c, d])| [a.inf(&c), b.sup(&d)]);
+    let view = look.view(&drawings, both)?;
     let draw = |drawing| view.draw(ctx, drawing).or_fail();
     draw(&drawings[0])?.beside(&draw(&drawings[1])?).or_fail()
 }

@@ -6,13 +6,13 @@ use frazil::render::{Camera, Light, Size};
 use crate::cli::options;
 use crate::cli::session::Failure;
 
-/// Camera, light and size; by default a camera that sees everything, with the sun beside it.
+/// Camera, light and size; by default a camera that sees what moves, or everything, with the sun beside it.
 #[derive(clap::Args)]
 pub struct CameraOptions {
     /// Pixels.
     #[arg(long, default_value = "1280x720", value_parser = options::size)]
     pub size: Size,
-    /// Position of the camera (m) [default: so that everything is seen].
+    /// Position of the camera (m) [default: so that what moves is seen, or everything].
     #[arg(long, value_name = "X,Y,Z", value_parser = options::triple, allow_hyphen_values = true, requires = "target")]
     pub eye: Option<DVec3>,
     /// Point that the camera looks at (m).

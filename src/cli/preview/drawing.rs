@@ -11,6 +11,7 @@ use frazil::vdb::level_set;
 use frazil::{Context, Error, Result};
 
 use super::format::PictureFormat;
+use super::sources::Sources;
 use super::tint::{Tint, Tinted};
 use crate::cli::preview::parts::Part;
 use crate::cli::session::Failure;
@@ -31,7 +32,7 @@ const INK: [f32; 3] = [0.0; 3];
 pub struct Look {
     /// Pixels.
     pub size: Size,
-    /// The camera; none: one with everything in the picture.
+    /// The camera; none: one that sees what moves, or everything.
     pub camera: Option<Camera>,
     /// The light; none: one beside the camera.
     pub light: Option<Light>,
@@ -132,16 +133,26 @@ impl Look {
         Ok(Drawing { content: Content::Models(models), has_colors, has_tint, invisible_reason })
     }
 
+    /// What the picture should show: see [`Sources::focus`]; `None` if the camera is chosen or faces a plane.
+    pub fn wanted_focus(&self, sources: &mut Sources) -> Option<[DVec3; 2]> {
+        let is_free = self.camera.is_none() && self.cut.is_none();
+        is_free.then(|| sources.focus()).flatten()
+    }
+
     /// The numbers of the vertices that `--color` chooses.
     fn numbers(&self, detailed: &DetailedMesh) -> Option<Vec<f64>> {
         detailed.of_vertices(self.color.as_deref()?)
     }
 
-    /// The chosen camera and light, or ones that show all drawings completely.
+    /// The chosen camera and light, or ones that show `focus` (m), as far as it is drawn, or all drawings completely.
     ///
     /// # Errors
     /// Nothing to see; nothing that `--color` can colour; a plane that misses everything.
-    pub fn view(&self, drawings: &[Drawing]) -> std::result::Result<View, Failure> {
+    pub fn view(
+        &self,
+        drawings: &[Drawing],
+        focus: Option<[DVec3; 2]>,
+    ) -> std::result::Result<View, Failure> {
         if let Some(name) = self.color.as_ref().filter(|_| drawings.iter().all(|drawing| !drawing.has_colors))
         {
             let what =
@@ -169,10 +180,18 @@ impl Look {
         }
         let camera = self.camera.unwrap_or_else(|| match self.cut {
             Some(plane) => Camera::facing(bounds, plane, self.size),
-            None => Camera::framing(bounds, self.size),
+            None => {
+                Camera::framing(focus.and_then(|focus| within(focus, bounds)).unwrap_or(bounds), self.size)
+            }
         });
         Ok(View { camera, light: self.light.unwrap_or_else(|| Light::beside(&camera)), size: self.size })
     }
+}
+
+/// The part of a box that lies within another; `None` if it is empty.
+fn within([low, high]: [DVec3; 2], around: (DVec3, DVec3)) -> Option<(DVec3, DVec3)> {
+    let (low, high) = (low.sup(&around.0), high.inf(&around.1));
+    (low.x < high.x && low.y < high.y && low.z < high.z).then_some((low, high))
 }
 
 /// Prepares parts to be cut by a plane: the first grid gives the colours, level sets and meshes become lines.

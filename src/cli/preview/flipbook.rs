@@ -76,7 +76,7 @@ impl<'a> Flipbook<'a> {
         if let Some(error) = first.filter(|_| probes.is_empty()) {
             return Err(error).or_refuse();
         }
-        let view = look.view(&probes)?;
+        let view = look.view(&probes, look.wanted_focus(&mut sources))?;
         Ok(Self { session, look, sources, frames, view, probes })
     }
 

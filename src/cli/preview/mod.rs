@@ -134,7 +134,7 @@ fn still(
 ) -> Result<(), Failure> {
     let parts = sources.read(&session.ctx, frame).or_refuse()?;
     let drawing = look.build(&session.ctx, parts).or_refuse()?;
-    let view = look.view(std::slice::from_ref(&drawing))?;
+    let view = look.view(std::slice::from_ref(&drawing), look.wanted_focus(&mut sources))?;
     let bytes = view.encoded(&session.ctx, &drawing, format);
     bytes.and_then(|bytes| atomic::write_bytes(path, &bytes)).or_fail()
 }

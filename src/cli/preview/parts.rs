@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use frazil::geometry::{DetailedMesh, Points, TriMesh};
+use frazil::geometry::{DVec3, DetailedMesh, Points, TriMesh};
 #[cfg(feature = "vdb")]
 use frazil::vdb::FloatGrid;
 use frazil::{Context, Error, Result, io};
@@ -51,6 +51,11 @@ pub trait Folder: Send {
     /// # Errors
     /// A file that cannot be read or that differs from what was written; cancel.
     fn read(&mut self, ctx: &Context, frame: i32) -> Result<Vec<Part>>;
+
+    /// The lowest and the highest corner (m) of what a picture should show, over the whole shot; `None` if that is everything.
+    fn focus(&mut self) -> Option<[DVec3; 2]> {
+        None
+    }
 
     /// Refuses a frame that one of its stages lacks.
     ///

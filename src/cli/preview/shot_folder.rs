@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 
 use super::grids::parts_of_vdb;
 use super::parts::{Folder, Part, points_of};
+use frazil::geometry::{DVec3, DetailedMesh};
 use frazil::io::mesh::{self, extension};
+use frazil::render::Camera;
 use frazil::scene::run::DoneFrames;
-use frazil::scene::{Rebuild, RebuildGrains, Scene};
+use frazil::scene::{MovingObjects, Rebuild, RebuildGrains, Scene};
 use frazil::vdb::{FloatGrid, file};
 use frazil::{Context, Error, Result};
 
@@ -20,6 +22,8 @@ pub struct ShotFolder {
     objects: DoneFrames,
     surface: DoneFrames,
     files: [Files; 5],
+    /// The moving objects of the scene, if the folder has no files of them.
+    moving: Option<MovingObjects>,
     /// The frames that all stages have, ascending; at least one.
     frames: Vec<i32>,
 }
@@ -35,6 +39,11 @@ const STAGES: [(&str, &[&str]); 5] = [
     ("objects", &["ply", "usdc"]),
     ("surface", &["ply", "usdc"]),
 ];
+
+/// Index of the moving objects among them.
+const OBJECTS: usize = 3;
+/// Maximum number of frames at which objects are posed to find their bounds.
+const MAX_POSES: usize = 48;
 
 impl ShotFolder {
     /// Opens a folder.
@@ -53,7 +62,29 @@ impl ShotFolder {
             let what = format!("is not the folder of a shot with frames to draw from its stages ({names})");
             return Err(Error::file(folder, what));
         }
-        Ok(Self { folder: folder.to_path_buf(), base, grains, mist, objects, surface, files, frames })
+        let moving = (files[OBJECTS].is_empty() && !files[0].is_empty()).then(|| moving_objects(folder));
+        let moving = moving.flatten();
+        Ok(Self { folder: folder.to_path_buf(), base, grains, mist, objects, surface, files, moving, frames })
+    }
+
+    /// The corners of the objects' extents in their files, as far as reports have them, or of their poses, over all frames.
+    fn bounds_of_objects(&self) -> Result<Option<(DVec3, DVec3)>> {
+        if let Some(moving) = &self.moving {
+            let step = self.frames.len().div_ceil(MAX_POSES);
+            let frames: Vec<i32> =
+                self.frames.iter().step_by(step).chain(self.frames.last()).copied().collect();
+            return moving.bounds(&frames);
+        }
+        let mut all = None::<(DVec3, DVec3)>;
+        for frame in &self.frames {
+            let contents = self.objects.contents(*frame, STAGES[OBJECTS].0)?.unwrap_or_default();
+            for prim in contents.as_object().into_iter().flat_map(|prims| prims.values()) {
+                if let Some([low, high]) = corners(&prim["extent_m"]) {
+                    all = Some(all.map_or((low, high), |(a, b)| (a.inf(&low), b.sup(&high))));
+                }
+            }
+        }
+        Ok(all)
     }
 
     /// The surface of the snow after a frame.
@@ -118,8 +149,36 @@ impl Folder for ShotFolder {
                 parts.push(Part::Mesh(mesh::read_any(&path)?.into_detailed().without_unused()));
             }
         }
+        for mesh in self.moving.iter().map(|moving| moving.at(frame)).collect::<Result<Vec<_>>>()?.concat() {
+            parts.push(Part::Mesh(DetailedMesh { mesh, ..DetailedMesh::default() }.without_unused()));
+        }
         Ok(parts)
     }
+
+    fn focus(&mut self) -> Option<[DVec3; 2]> {
+        // A folder of another system shows all that it has.
+        let (low, high) = self.bounds_of_objects().unwrap_or_else(|error| {
+            log::warn!("{error}: the picture shows everything");
+            None
+        })?;
+        Some(Camera::surroundings((low, high)).into())
+    }
+}
+
+/// The moving objects of the scene with snow that a folder has; `None` and a warning if their files cannot be read.
+fn moving_objects(folder: &Path) -> Option<MovingObjects> {
+    let scene = Scene::read(&folder.join("scene.toml"));
+    let moving = scene.and_then(|scene| MovingObjects::read(&scene));
+    moving.inspect_err(|error| log::warn!("{error}: the objects are not drawn")).ok()
+}
+
+/// The corners of an extent in a report (m).
+fn corners(extent: &serde_json::Value) -> Option<[DVec3; 2]> {
+    let corner = |at: usize| {
+        let axis = |axis: usize| extent.get(at)?.get(axis)?.as_f64();
+        Some(DVec3::new(axis(0)?, axis(1)?, axis(2)?))
+    };
+    Some([corner(0)?, corner(1)?])
 }
 
 /// The files of a stage to draw; a warning if it has none of a readable kind.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use frazil::geometry::{DetailedMesh, TriMesh};
+use frazil::geometry::{DVec3, DetailedMesh, TriMesh};
 use frazil::io::files::sequence::Pattern;
 use frazil::motion::{Character, Play, is_gltf};
 use frazil::{Context, Error, Result, io};
@@ -60,6 +60,17 @@ impl Sources {
             all.retain(|frame| other.contains(frame));
             all
         })
+    }
+
+    /// The lowest and the highest corner (m) of what a picture of the shots should show; `None` if that is everything, as in a picture with
+    /// anything else.
+    pub fn focus(&mut self) -> Option<[DVec3; 2]> {
+        let of_source = |source: &mut Source| match source {
+            Source::Folder(folder) => folder.focus(),
+            _ => None,
+        };
+        let all: Option<Vec<_>> = self.all.iter_mut().map(of_source).collect();
+        all?.into_iter().reduce(|a, b| [a[0].inf(&b[0]), a[1].sup(&b[1])])
     }
 
     /// Whether any input depends on the frame.

@@ -187,7 +187,7 @@ impl DoneFrames {
     /// # Errors
     /// A missing frame or one without such a file; a file that differs from what was written.
     pub fn file(&self, frame: i32, kind: &str) -> Result<PathBuf> {
-        self.find(frame, kind, |_| true)
+        self.find(frame, kind, None)
     }
 
     /// A frame's file of a kind with an extension; its content is verified.
@@ -195,15 +195,24 @@ impl DoneFrames {
     /// # Errors
     /// As [`DoneFrames::file`].
     pub fn file_with(&self, frame: i32, kind: &str, extension: &str) -> Result<PathBuf> {
-        self.find(frame, kind, |written| {
-            Path::new(&written.path).extension().is_some_and(|own| own == extension)
-        })
+        self.find(frame, kind, Some(extension))
     }
 
-    fn find(&self, frame: i32, kind: &str, matches: impl Fn(&Written) -> bool) -> Result<PathBuf> {
+    /// Whether a frame has a file of a kind with an extension.
+    pub fn has_file(&self, frame: i32, kind: &str, extension: &str) -> bool {
         let manifest = self.done.get(&frame);
-        let written = manifest.and_then(|manifest| manifest.files_of(kind).find(|written| matches(written)));
-        let missing = || Error::file(&self.folder, format!("frame {frame} has no file in {kind}/"));
+        manifest
+            .is_some_and(|manifest| manifest.files_of(kind).any(|written| has_extension(written, extension)))
+    }
+
+    fn find(&self, frame: i32, kind: &str, extension: Option<&str>) -> Result<PathBuf> {
+        let is_wanted = |written: &&Written| extension.is_none_or(|wanted| has_extension(written, wanted));
+        let manifest = self.done.get(&frame);
+        let written = manifest.and_then(|manifest| manifest.files_of(kind).find(is_wanted));
+        let missing = || {
+            let of = extension.map_or(String::new(), |extension| format!(".{extension} "));
+            Error::file(&self.folder, format!("frame {frame} has no {of}file in {kind}/"))
+        };
         self.verified(written.ok_or_else(missing)?)
     }
 
@@ -249,4 +258,8 @@ pub struct Resumable<'a> {
     pub own_from: i32,
     /// The frames that are done.
     pub done: &'a DoneFrames,
+}
+
+fn has_extension(written: &Written, extension: &str) -> bool {
+    Path::new(&written.path).extension().is_some_and(|own| own == extension)
 }

@@ -14,7 +14,7 @@ use super::pass::{AnyStage, Pass, Shared, Work};
 use super::pipeline::Pipeline;
 use super::stage::{Report, Stage};
 use super::{chain, own_files, usd};
-use crate::context::Context;
+use crate::context::{Context, release_freed_memory};
 use crate::error::{Error, Result};
 use crate::io::records::manifest::Manifest;
 use crate::scene::FrameChoice;
@@ -281,6 +281,8 @@ impl<'a> Run<'a> {
         let mut first_error = None;
         while let Some(ready) = self.ready() {
             let results = self.make_stages(ctx, &ready, &on_done)?;
+            // So that the next stages do not add to what these have freed.
+            release_freed_memory();
             for (position, result) in ready.into_iter().zip(results) {
                 let Err(error) = result else { continue };
                 if matches!(error, Error::Cancelled) {

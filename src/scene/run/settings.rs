@@ -20,11 +20,12 @@ pub type Settings = BTreeMap<String, String>;
 
 /// Keys whose defaults have changed: what a folder that was made before has, and what the same scene says now. Such a folder is resumed:
 /// its frames stay as they are, and new ones are written in the new way.
-const NEW_DEFAULTS: [(&str, Option<&str>, Option<&str>); 9] = [
+const NEW_DEFAULTS: [(&str, Option<&str>, Option<&str>); 10] = [
     ("output.surface", Some(r#"["ply"]"#), Some(r#"["usd"]"#)),
     ("output.liquid", Some(r#"["ply"]"#), Some(r#"["usd"]"#)),
     ("output.terrain", None, Some(r#"["usd"]"#)),
-    ("output.grains", Some(r#"["vdb"]"#), Some(r#"["vdb", "usd"]"#)),
+    ("output.grains", Some(r#"["vdb"]"#), None),
+    ("output.grains", Some(r#"["vdb", "usd"]"#), None),
     ("output.mist_half", None, Some("true")),
     ("output.names", None, Some(r#""houdini""#)),
     ("output.mesh", Some("[]"), None),

@@ -62,8 +62,10 @@ pub struct Report {
     pub falls: bool,
     /// Names of the scalars that it carries.
     pub scalars: Vec<String>,
-    /// Estimated memory of the run (bytes).
+    /// Bound of the run's memory (bytes), by which it is refused.
     pub memory_bytes: u64,
+    /// Memory that the run is expected to take at its peak (bytes).
+    pub memory_forecast_bytes: u64,
     /// Maximum size of the files (bytes): if all columns are wet.
     pub disk_bytes: u64,
     /// Maximum size of the files of a frame (bytes).
@@ -107,6 +109,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     let mut warnings = inputs.warnings.clone();
     warnings.extend(probable_mistakes(setup, inputs, &state, void_cells));
     warnings.extend(warnings_of_later_frames(ctx, scene, state)?);
+    let [memory_bytes, memory_forecast_bytes] = estimate::memory(setup, &grid, count as u64, triangles);
     Ok(Report {
         frames: [frames.first, frames.last],
         fps: scene.shot.fps,
@@ -128,7 +131,8 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
         deepest_m: heights.length(deepest.into()),
         falls: setup.params.falls.is_some(),
         scalars: setup.scalars.iter().map(|carried| carried.scalar.name.clone()).collect(),
-        memory_bytes: estimate::memory(setup, &grid, count as u64, triangles),
+        memory_bytes,
+        memory_forecast_bytes,
         disk_bytes: frames.count() as u64 * frame_bytes,
         frame_bytes,
         warnings,

@@ -8,7 +8,7 @@ use crate::shallow::free_fall::mesh::bound;
 use crate::shallow::params::Friction;
 
 /// Bytes that every run takes.
-const FIXED: u64 = 32_000_000;
+const FIXED: u64 = 50_000_000;
 /// Bytes of a cell while the terrain is converted to columns: its crossings and solids, in two copies.
 const CELL: u64 = 64;
 /// Bytes of a column: liquid, pipes and scratch data 100; its vertex and triangles while they are made 150; in up to three steps that wait
@@ -38,14 +38,25 @@ pub(in crate::scene::shallow) fn allow_cells(ctx: &Context, grid: &Grid) -> Resu
     ctx.allow(&what, FIXED + (CELL + COLUMN) * grid.cells() as u64)
 }
 
-/// Estimated bytes of a run.
-pub(in crate::scene::shallow) fn memory(setup: &Shallow, grid: &Grid, columns: u64, triangles: u64) -> u64 {
+/// Share of the bytes of drops, and of all others, that is expected to be used: few drops are in the air, and few columns are wet.
+const EXPECTED_OF_DROPS: f64 = 0.03;
+const EXPECTED_OF_REST: f64 = 0.7;
+
+/// Bytes of a run: at most, and as expected.
+pub(in crate::scene::shallow) fn memory(
+    setup: &Shallow,
+    grid: &Grid,
+    columns: u64,
+    triangles: u64,
+) -> [u64; 2] {
     let walls = if setup.params.friction == Friction::Walls { WALLS } else { 0 };
     let thick = if setup.params.thickening.is_some() { THICK } else { 0 };
     let triangle = TRIANGLE + if setup.staining.is_some() { STAINED } else { 0 };
     let column = COLUMN + SCALAR * setup.scalars.len() as u64 + walls + thick;
     let drops = DROP * setup.params.falls.map_or(0, |falls| falls.max_packets as u64);
-    FIXED + CELL * grid.cells() as u64 + column * columns + triangle * triangles + drops
+    let rest = CELL * grid.cells() as u64 + column * columns + triangle * triangles;
+    let expected = EXPECTED_OF_REST * rest as f64 + EXPECTED_OF_DROPS * drops as f64;
+    [FIXED + rest + drops, FIXED + expected as u64]
 }
 
 /// Bytes of an index in a USD file, packed.

@@ -6,6 +6,9 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use super::estimate::grains::Removed;
+use super::estimate::peak::{Counts, peak};
+use super::estimate::removed::removed;
 use super::estimate::{disk, memory};
 use super::inspect::object_path::ObjectPath;
 use super::inspect::relief::Relief;
@@ -29,12 +32,14 @@ pub struct Report {
     pub cell_m: f64,
     /// The objects.
     pub objects: Vec<ObjectReport>,
-    /// The grains, if the scene has some and its base exists.
+    /// The grains, if the scene has some, and the heights of its snow are known or its base exists.
     pub grains: Option<Forecast>,
     /// The mist, if the scene has some.
     pub mist: Option<MistForecast>,
-    /// Estimated memory of the run (bytes); without mist, and without grains whose number is not known yet.
+    /// Bound of the run's memory (bytes), by which it is refused; without mist, and without grains whose number is not known yet.
     pub memory_bytes: u64,
+    /// Memory that the run is expected to take at its peak (bytes), with mist; without grains whose number is not known yet.
+    pub memory_forecast_bytes: u64,
     /// Estimated size of its files (bytes); without mist, and without grains whose number is not known yet.
     pub disk_bytes: Option<u64>,
     /// Probable mistakes, one sentence each.
@@ -43,8 +48,8 @@ pub struct Report {
     pub settings: BTreeMap<String, Value>,
 }
 
-/// Checks a scene whose inputs are open. `folder` is its output folder: the number of grains is estimated from the base there, and the
-/// extent of mist from the mist there.
+/// Checks a scene whose inputs are open. `folder` is its output folder: the number of grains is estimated from the base there, if it exists,
+/// and the extent of mist from the mist there.
 ///
 /// # Errors
 /// A frame that cannot be read or does not match the others; a damaged record of the base; cancel.
@@ -66,21 +71,21 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs, folder: Option<&Path
         warnings
             .push("nothing moves through the snow: no object has the role collide, base or grains".into());
     }
-    let grains = match folder.filter(|_| has_grains(&scene.values)) {
-        Some(folder) => {
-            Forecast::of(scene, inputs, &DoneFrames::read(folder, "base")?, scene.shot.frames.last)?
+    let grains = match has_grains(&scene.values) {
+        true => {
+            Forecast::of(scene, inputs, &removed_snow(ctx, scene, inputs, folder, &paths, relief.as_ref())?)?
         }
-        None => None,
+        false => None,
     };
     let mist = folder.filter(|_| has_mist(&scene.values));
     let mist = mist.map(|folder| DoneFrames::read(folder, "mist")).transpose()?;
     let mist = MistForecast::of(ctx, scene, &paths, mist.as_ref())?;
-    let (memory, disk) = match &grains {
-        Some(grains) => {
-            let volumes = memory::of_volumes(scene, inputs, grains.grains)?;
-            (grains.memory_bytes.max(volumes), grains.disk_bytes)
-        }
-        None => (0, 0),
+    let memory =
+        grains.as_ref().map(|grains| memory::with_grains(scene, inputs, grains.grains)).transpose()?;
+    let disk = grains.as_ref().map_or(0, |grains| grains.disk_bytes);
+    let counts = Counts {
+        grains: grains.as_ref().map_or(0, |grains| grains.grains),
+        cells: mist.as_ref().map_or(0, |mist| mist.cells),
     };
     Ok(Report {
         frames: [scene.shot.frames.first, scene.shot.frames.last],
@@ -90,9 +95,29 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs, folder: Option<&Path
         objects,
         grains,
         mist,
-        memory_bytes: memory::estimate(scene, inputs)?.max(memory),
+        memory_bytes: memory::estimate(scene, inputs)?.max(memory.unwrap_or_default()),
+        memory_forecast_bytes: peak(scene, inputs, &counts)?,
         disk_bytes: Some(disk::estimate(scene, inputs) + disk),
         warnings,
         settings: scene.values.by_path(),
     })
+}
+
+/// The snow that is removed in each frame: as far as a base in `folder` tells, then by the poses of objects, if heights of the snow are known.
+fn removed_snow(
+    ctx: &Context,
+    scene: &Scene,
+    inputs: &Inputs,
+    folder: Option<&Path>,
+    paths: &[ObjectPath],
+    relief: Option<&Relief>,
+) -> Result<Removed> {
+    let by_base = match folder {
+        Some(folder) => Removed::by_base(scene, &DoneFrames::read(folder, "base")?, scene.shot.frames.last)?,
+        None => Removed::default(),
+    };
+    match relief.filter(|_| by_base.missing(scene) > 0) {
+        Some(relief) => Ok(by_base.and_estimated(&removed(ctx, scene, relief, paths, inputs.snow.cell)?)),
+        None => Ok(by_base),
+    }
 }

@@ -347,7 +347,7 @@ fn layer_grid(path: &Path, cell: f64, input_hashes: &InputHashes) -> Result<Floa
 }
 
 /// An object's motion: that of its file, shifted by its offset and converted to metres and Y up, with the keys on top.
-fn motion(
+pub(super) fn motion(
     scene: &Scene,
     object: &Object,
     input_hashes: &Arc<InputHashes>,

@@ -16,6 +16,8 @@ mod inputs;
 mod inspect;
 mod keys;
 #[cfg(feature = "vdb")]
+mod moving_objects;
+#[cfg(feature = "vdb")]
 mod pipeline;
 #[cfg(feature = "vdb")]
 mod stages;
@@ -34,7 +36,9 @@ pub use {
     estimate::mist::MistForecast,
     inputs::Inputs,
     inspect::foot_slip::FootSlip,
+    moving_objects::MovingObjects,
     pipeline::pipeline,
-    stages::grain_files::{RebuildGrains, changes_since, partial},
+    stages::grain_files::{changes_since, partial},
+    stages::grain_reader::RebuildGrains,
     stages::rebuild::Rebuild,
 };

@@ -42,9 +42,11 @@ pub struct Report {
     pub size_m: [f64; 3],
     /// Mean length of its edges (m).
     pub edge_m: f64,
-    /// Estimated memory of the run (bytes); it may be more if vertices keep a distance of more than half a spacing from
+    /// Bound of the run's memory (bytes); it may be more if vertices keep a distance of more than half a spacing from
     /// the particles' surface.
     pub memory_bytes: u64,
+    /// Memory that the run is expected to take at its peak (bytes).
+    pub memory_forecast_bytes: u64,
     /// Estimated size of the files (bytes).
     pub disk_bytes: u64,
     /// Estimated size of the files of a frame (bytes): the mesh, its exact state, report and record.
@@ -131,6 +133,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     }
     let (count, frame) =
         (shot.frames.count() as u64, FrameSize::of(surface.output, surface.rebuild, &inputs.mesh));
+    let [memory_bytes, memory_forecast_bytes] = maxima.estimate(surface, files.len(), &inputs.mesh, &frame);
     Ok(Report {
         frames: [shot.frames.first, shot.frames.last],
         fps: shot.fps,
@@ -144,7 +147,8 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
         triangles: mesh.triangles.len(),
         size_m: (high - low).into(),
         edge_m: edge,
-        memory_bytes: maxima.estimate(surface, files.len(), &inputs.mesh, &frame),
+        memory_bytes,
+        memory_forecast_bytes,
         disk_bytes: count * frame.sum(),
         frame_bytes: frame.sum(),
         warnings,

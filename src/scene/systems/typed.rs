@@ -69,6 +69,10 @@ impl Output {
         };
         // By default, the mesh is written where it can be made: other systems write no base.
         all.volumes.mesh_usd |= output.value("mesh").is_none() && all.base_restarts();
+        // Only .vdb files hold changes; other systems write no grains.
+        let no_grains_key = output.value("grains").is_none();
+        all.grains_usd |= no_grains_key;
+        all.grains_vdb |= no_grains_key && all.grains_delta;
         all
     }
 
@@ -90,10 +94,11 @@ impl Output {
                 table.error("grains_mode", "= \"delta\" is for .vdb files: `grains` must hold \"vdb\"")
             );
         }
-        if snow::has_mist(values) && !output.grains_vdb {
-            return Err(
-                table.error("grains", "leaves out what `[mist]` reads of every frame: it must hold \"vdb\"")
-            );
+        if snow::has_mist(values) && !output.grains_readable() {
+            return Err(table.error(
+                "grains",
+                "leaves out what `[mist]` reads of every frame: it must hold \"usd\" or \"vdb\"",
+            ));
         }
         if output.half && output.base && output.base_mode == BaseMode::Delta {
             return Err(table.error("half", "goes with `base_mode = \"full\"` only: changes must be exact"));

@@ -241,7 +241,8 @@ fn every_command_has_help_with_an_example_that_runs() {
     fs::write(folder.join("hero.glb"), hero::glb()).unwrap();
     works(folder, "frazil snow walker.toml -o cache -q");
     // The same base, with grains.
-    fs::write(folder.join("grains.toml"), format!("{scene}[grains]\n")).unwrap();
+    fs::write(folder.join("grains.toml"), format!("{scene}[grains]\n[output]\ngrains = [\"vdb\"]\n"))
+        .unwrap();
     works(folder, "frazil snow grains.toml -o cache -q");
     for (name, by) in [("left", "0.1,0,0"), ("snow", "0,0.1,0")] {
         works(folder, &format!("frazil vdb sweep box.obj --move {by} --cell 0.02 -o {name}.vdb -q"));

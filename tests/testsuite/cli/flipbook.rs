@@ -22,7 +22,7 @@ fn shots() -> Folder {
     let folder = Folder::empty();
     fs::write(folder.join("cube.obj"), CUBE).unwrap();
     let scene = "[shot]\nframes = \"1-4\"\nfps = 12\n[snow]\nground = 0.0\narea = [-0.6, -0.6, 0.6, 1.0]\ndepth = 0.3\n\
-                 cell = 0.04\n[grains]\n[output]\nobjects = [\"ply\"]\n[[object]]\nfile = \"cube.obj\"\n\
+                 cell = 0.04\n[grains]\n[output]\ngrains = [\"vdb\"]\nobjects = [\"ply\"]\n[[object]]\nfile = \"cube.obj\"\n\
                  keys = [{ frame = 1, at = [0, 0.1, 0] }, { frame = 4, at = [0, 0.1, 0.3] }]\n";
     fs::write(folder.join("shot.toml"), scene).unwrap();
     works(&folder, "snow shot.toml -o shot -q");
@@ -135,6 +135,44 @@ fn add_mist(folder: &Path, frame: i32, blocks: usize) {
     let manifest =
         Manifest { frame, inputs: String::new(), keeps: Keeps::Whole, files, state: None, next: None };
     manifest.write(folder, "mist").unwrap();
+}
+
+#[test]
+fn objects_without_files_are_drawn_in_their_poses_and_the_camera_follows_what_moves() {
+    let folder = Folder::empty();
+    fs::write(folder.join("cube.obj"), CUBE).unwrap();
+    // A cube of 0.4 m in the corner of a field of 6 m.
+    let scene = "[shot]\nframes = \"1-4\"\n[snow]\nground = 0.0\narea = [-0.6, -0.6, 5.4, 5.4]\ndepth = 0.3\ncell = 0.04\n\
+                 [output]\nmesh = []\n[[object]]\nfile = \"cube.obj\"\n\
+                 keys = [{ frame = 1, at = [0, 0.1, 0] }, { frame = 4, at = [0, 0.1, 0.3] }]\n";
+    fs::write(folder.join("shot.toml"), scene).unwrap();
+    for (out, objects) in [("usd", "[\"usd\"]"), ("ply", "[\"ply\"]"), ("none", "[]")] {
+        works(&folder, &format!("snow shot.toml -o {out} -q --set output.objects={objects}"));
+    }
+    let draw = |what: &str| {
+        works(&folder, &format!("preview {what} -o p.png {SIZE}"));
+        read(&folder, "p.png")
+    };
+    let camera = "--frame 3 --eye 1,1.2,2 --target 0,0.2,0.2";
+    let posed = draw(&format!("none {camera}"));
+    assert!(posed == draw(&format!("ply {camera}")) && posed == draw(&format!("usd {camera}")));
+    // With automatic cameras: reports hold no extents of .ply files, so that all is seen.
+    let [whole, usd, none] = ["ply", "usd", "none"].map(|out| {
+        draw(out);
+        share_of_brown(&folder.join("p.png"))
+    });
+    assert!(usd > 5.0 * whole && none > 5.0 * whole && usd > 0.02, "{whole} {usd} {none}");
+    // Without the object's file the snow is drawn alone.
+    fs::remove_file(folder.join("cube.obj")).unwrap();
+    assert!(draw(&format!("none {camera}")) != posed);
+    assert!(draw(&format!("usd {camera}")) == posed);
+}
+
+/// The share of a picture's pixels that have the colour of objects.
+fn share_of_brown(path: &Path) -> f64 {
+    let pixels = Picture::open(path).pixels;
+    let is_brown = |[red, _, blue]: &&[u8; 3]| i32::from(*red) > i32::from(*blue) + 20;
+    pixels.iter().filter(is_brown).count() as f64 / pixels.len() as f64
 }
 
 #[test]

@@ -49,7 +49,7 @@ fn a_new_scene_lacks_nothing_but_its_character() {
             _ => line.to_string(),
         })
         .filter(|line| {
-            !["top =", "node =", "clip =", "loop =", "compression =", "mesh ="]
+            !["top =", "node =", "clip =", "loop =", "compression =", "mesh =", "grains ="]
                 .iter()
                 .any(|key| line.starts_with(key))
         })

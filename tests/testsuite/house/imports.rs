@@ -54,9 +54,10 @@ const LAW: [(&str, &[&str]); 16] = [
 ];
 
 /// Files besides those of vdb and capi that may contain `unsafe`.
-const UNSAFE: [&str; 9] = [
+const UNSAFE: [&str; 10] = [
     "src/numeric/cpu.rs",
     "src/numeric/lanes.rs",
+    "src/context/memory.rs",
     "src/context/pool.rs",
     "src/shallow/solver/transfers/whole_units.rs",
     "src/snow/grains/solver/collide.rs",

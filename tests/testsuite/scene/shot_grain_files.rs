@@ -183,7 +183,10 @@ fn damaged_changes_are_one_error_that_names_the_file() {
         let frame = 8 + (round % 2) as i32;
         for cache in [Some(&mut cache), opened.as_mut().ok()].into_iter().flatten() {
             let error = cache.bytes(&ctx, frame, &options).expect_err("refused").to_string();
-            assert!(error.contains("grains.0008.vdb") || error.contains("frame 8 has no file"), "{error}");
+            assert!(
+                error.contains("grains.0008.vdb") || error.contains("frame 8 has no .vdb file"),
+                "{error}"
+            );
         }
         // A whole file of a later frame helps nobody; those before are there.
         if round % 100 == 0 {
@@ -197,7 +200,7 @@ fn damaged_changes_are_one_error_that_names_the_file() {
     let rebuild = |frame: i32| format!("vdb rebuild out --stage grains --frame {frame} -o x.vdb");
     fs::remove_file(&path).unwrap();
     fails(at, &rebuild(8), 2, &["out", "frame 8 does not exist"]);
-    fails(at, &rebuild(9), 1, &["out", "frame 8 has no file in grains/"]);
+    fails(at, &rebuild(9), 1, &["out", "frame 8 has no .vdb file in grains/"]);
     works(at, &rebuild(7));
     works(at, &rebuild(7).replace("x.vdb", "seven.vdb"));
     let foreign = fs::read(at.join("other").join(name)).unwrap();

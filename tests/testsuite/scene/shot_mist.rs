@@ -31,11 +31,16 @@ pub fn written(at: &Path, out: &str, kinds: &[&str]) -> Vec<std::time::SystemTim
 
 /// The grids of mist of each frame, without what their files say of their inputs.
 fn grids(at: &Path, out: &str) -> Vec<Vec<u8>> {
+    densities(at, out, "mist")
+}
+
+/// The densities of each frame in a folder, without what their files say of their inputs.
+fn densities(at: &Path, out: &str, kind: &str) -> Vec<Vec<u8>> {
     let density = |name: String| match read_any(&at.join(out).join(name), Some("density")).unwrap() {
         AnyGrid::Floats(grid) => to_bytes(&[&grid], &Default::default()).unwrap(),
         AnyGrid::Vectors(_) => panic!("a density of vectors"),
     };
-    files(at, out, &["mist"]).into_iter().map(|(name, _)| density(name)).collect()
+    files(at, out, &[kind]).into_iter().map(|(name, _)| density(name)).collect()
 }
 
 fn report(at: &Path, out: &str, frame: i32) -> serde_json::Value {
@@ -90,6 +95,24 @@ fn mist_is_made_and_made_again_without_touching_base_and_grains() {
     // Those that were changed by another hand are refused.
     fs::copy(at.join("out/grains/grains.0009.vdb"), at.join("out/grains/grains.0010.vdb")).unwrap();
     fails(at, &format!("snow shot.toml -o out -q --stage mist --from 10 {again}"), 2, &["grains.0010.vdb"]);
+}
+
+#[test]
+fn mist_and_fog_are_the_same_from_grains_in_any_files() {
+    let at = &folder(GRAINS, &format!("fog = [\"grains\"]\n{COARSE}"));
+    for (out, grains) in [("vdb", "[\"vdb\"]"), ("usd", "[\"usd\"]"), ("both", "[\"usd\",\"vdb\"]")] {
+        works(at, &format!("snow shot.toml -o {out} -q --set output.grains={grains}"));
+    }
+    for kind in ["mist", "fog"] {
+        let of_vdb = densities(at, "vdb", kind);
+        assert!(of_vdb.len() == 10 && of_vdb == densities(at, "usd", kind), "{kind}");
+        assert!(of_vdb == densities(at, "both", kind), "{kind}");
+    }
+    // A file of grains that is not what was written is refused, whatever it is.
+    let grains = "usd/grains/grains.0009.usdc";
+    fs::copy(at.join(grains), at.join("usd/grains/grains.0010.usdc")).unwrap();
+    let set = "--set output.grains=[\"usd\"]";
+    fails(at, &format!("snow shot.toml -o usd -q --stage mist --from 10 {set}"), 2, &["grains.0010.usdc"]);
 }
 
 #[test]

@@ -124,7 +124,8 @@ pub fn kill<T>(pass: impl Fn(usize) -> Command, within: f64, seen: impl Fn() -> 
 /// A pass of a scene, quiet.
 pub fn pass(scene: &Path, out: &Path, threads: usize) -> Command {
     let mut run = frazil(["snow", "-q", "--threads", &threads.to_string()]);
-    run.arg(scene).arg("-o").arg(out);
+    // The gates read grains as points of .vdb files.
+    run.arg(scene).arg("-o").arg(out).args(["--set", "output.grains=[\"vdb\"]"]);
     quiet(&mut run);
     run
 }

@@ -1,4 +1,5 @@
-//! Forecast of the count, memory and disk space of the grains that a base makes, from the base's reports, before the first grain is made.
+//! Forecast of the count, memory and disk space of grains before the first one is made: from the snow that the base's reports say is removed,
+//! or, where the base does not exist yet, that objects would remove.
 
 use serde::Serialize;
 
@@ -14,11 +15,13 @@ use crate::snow::grains::PACKING;
 /// Relative error of an estimate of the count of grains.
 const ESTIMATE_ERROR: f64 = 0.1;
 
-/// Forecast of the grains from a base.
+/// Forecast of the grains of a shot.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Forecast {
-    /// The last frame of the base that is counted.
+    /// The last frame that is counted.
     pub to_frame: i32,
+    /// The last frame whose removed snow is known from the base; that of later frames is estimated from the poses of objects.
+    pub base_to_frame: Option<i32>,
     /// Snow removed after the first frame (m3).
     pub removed_m3: f64,
     /// Share of that snow that does not become grains: the minimum over all objects that remove snow.
@@ -33,26 +36,59 @@ pub struct Forecast {
     pub disk_bytes: u64,
 }
 
-impl Forecast {
-    /// Forecast from the frames of a base up to `last`; ends at the first missing frame or report. None if that is the first
-    /// frame.
+/// Snow removed in each frame from a shot's first one on (m3).
+#[derive(Default)]
+pub(in crate::scene::snow) struct Removed {
+    volumes: Vec<f64>,
+    /// How many of the frames are known from the base.
+    by_base: usize,
+}
+
+impl Removed {
+    /// Up to `last`, from the reports of a base; ends at the first missing frame or report.
     ///
     /// # Errors
-    /// A damaged report; a file of the layer that cannot be read.
-    pub fn of(scene: &Scene, inputs: &Inputs, base: &DoneFrames, last: i32) -> Result<Option<Self>> {
-        let first = scene.shot.frames.first;
-        let mut removed = Vec::new();
-        for frame in first..=last {
+    /// A damaged report.
+    pub fn by_base(scene: &Scene, base: &DoneFrames, last: i32) -> Result<Self> {
+        let mut volumes = Vec::new();
+        for frame in scene.shot.frames.first..=last {
             let report = if base.is_done(frame) { base.report(frame)? } else { None };
             let Some(volume) = report.as_ref().and_then(|report| report.get("removed_m3")?.as_f64()) else {
                 break;
             };
-            // Snow cut out by the first poses was removed before the shot began.
-            removed.push(if frame == first { 0.0 } else { volume });
+            volumes.push(volume);
         }
-        if removed.is_empty() {
-            return Ok(None);
-        }
+        let by_base = volumes.len();
+        Ok(Self { volumes, by_base })
+    }
+
+    /// With the frames that are not known from the base, by an estimate of all frames (m3).
+    pub fn and_estimated(mut self, estimated: &[f64]) -> Self {
+        self.volumes.extend(estimated.iter().skip(self.by_base));
+        self
+    }
+
+    /// Number of frames of the shot that are not known.
+    pub fn missing(&self, scene: &Scene) -> usize {
+        scene.shot.frames.count() - self.volumes.len()
+    }
+}
+
+impl Forecast {
+    /// Forecast from the snow that is removed. None if not even the first frame is known.
+    ///
+    /// # Errors
+    /// A file of the layer that cannot be read.
+    pub(in crate::scene::snow) fn of(
+        scene: &Scene,
+        inputs: &Inputs,
+        removed: &Removed,
+    ) -> Result<Option<Self>> {
+        let first = scene.shot.frames.first;
+        let mut volumes = removed.volumes.clone();
+        let Some(of_first) = volumes.first_mut() else { return Ok(None) };
+        // Snow cut out by the first poses was removed before the shot began.
+        *of_first = 0.0;
         let params = params(scene, inputs.snow.cell);
         let removers = scene.objects.iter().enumerate().filter(|(_, object)| object.role.removes());
         let compression_of = |index| scene.values.element(OBJECT, index).find("compression");
@@ -61,14 +97,15 @@ impl Forecast {
         let compression = all.iter().copied().reduce(f64::min).unwrap_or(params.compression);
         let grain = std::f64::consts::PI / 6.0 * (2.0 * params.radius).powi(3);
         let grains_of = |volume: f64| volume * (1.0 - compression) * PACKING / grain;
-        let mut born: Vec<f64> = removed.iter().map(|volume| grains_of(*volume)).collect();
+        let mut born: Vec<f64> = volumes.iter().map(|volume| grains_of(*volume)).collect();
         born[0] += inputs.initial_grains.as_ref().map_or(0.0, |initial| initial.positions.len() as f64);
         let lifetime = params.lifetime.map(|lifetime| (lifetime * scene.shot.fps).ceil() as usize);
         let counts = alive(&born, lifetime.unwrap_or(usize::MAX));
         let grains = counts.iter().copied().fold(0.0, f64::max).round() as u64;
         Ok(Some(Self {
-            to_frame: first + (removed.len() - 1) as i32,
-            removed_m3: removed.iter().sum(),
+            to_frame: first + (volumes.len() - 1) as i32,
+            base_to_frame: removed.by_base.checked_sub(1).map(|after| first + after as i32),
+            removed_m3: volumes.iter().sum(),
             compression,
             grains,
             at_most: all.iter().any(|other| *other != compression) || params.keep_box.is_some(),
@@ -97,8 +134,12 @@ impl Forecast {
     }
 
     fn too_many(&self, scene: &Scene) -> String {
+        let source = match self.base_to_frame {
+            Some(frame) if frame == self.to_frame => "the base",
+            _ => "what objects remove",
+        };
         format!(
-            "{}: the base up to frame {} makes {}, more than grains.max = {}: a larger grains.radius or \
+            "{}: {source} up to frame {} makes {}, more than grains.max = {}: a larger grains.radius or \
              grains.compression makes fewer",
             scene.path.display(),
             self.to_frame,

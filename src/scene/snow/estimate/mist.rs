@@ -1,6 +1,7 @@
 //! Forecast of the memory and disk space of mist. The cost of a cell of air is known, but not how far mist will spread. So the count of
 //! cells is taken from mist that the output folder already holds, even if only of the shot's first frames or of coarser cells. Without any
-//! it is a rough estimate: the cells in the bounding boxes of all objects along their paths, for as long as mist lasts.
+//! it is a rough estimate: the cells in the bounding boxes of all objects along their paths, as high as grains as fast as the object's
+//! fastest vertex could be thrown above the snow, for as long as mist lasts.
 
 use std::collections::HashMap;
 
@@ -20,9 +21,9 @@ use crate::vdb::file;
 /// Cells along the edge of a tile, and in a tile. Air is simulated in whole tiles: those that hold mist and one layer around them.
 const EDGE: f64 = 8.0;
 const CELLS: u64 = 512;
-/// Bytes of a cell while a frame is written and the next one made: a copy of velocity, pressure and density with their neighbours (40);
-/// density and velocity as blocks, as grids and as a file (16 each).
-const BYTES_WRITING: u64 = 40 + 3 * 16;
+/// Bytes of a cell while a frame is written and the next one made: copies of velocity, pressure and density with their neighbours (40);
+/// density and velocity as blocks, as grids and as a file (16 each), for up to three frames; and what the heap keeps of freed memory (170).
+const BYTES_WRITING: u64 = 40 + 3 * 3 * 16 + 170;
 /// Bytes of a cell in mist/ (density and velocity) in 32 and in 16 bits, and in fog/, in 32 bits: they hardly compress.
 const BYTES_IN_MIST: u64 = 16;
 const BYTES_IN_HALF_MIST: u64 = 8;
@@ -158,14 +159,25 @@ fn cells_in_boxes(ctx: &Context, scene: &Scene, paths: &[ObjectPath], params: &P
     let lifetime = params.half_life * libm::log2(1.0 / f64::from(MIN_DENSITY)) * fps;
     let lifetime = (lifetime.ceil() as usize).min(count);
     let tile = EDGE * params.cell;
+    let gravity: f64 = scene.values.table("grains").get("gravity");
     let interval_box = |(frame, [low, high]): (i32, [DVec3; 2])| {
         // In a frame of reference that drifts with the wind.
         let drift = DVec3::from(params.wind) * (f64::from(frame) / fps);
         let margin = DVec3::repeat(tile);
         ((frame - frames.first) as usize / interval_length, [low - margin - drift, high + margin - drift])
     };
-    let boxes_of = |path: &ObjectPath| united(path.boxes_near_snow().map(interval_box));
-    let mut boxes: Vec<(usize, [DVec3; 2])> = paths.iter().flat_map(boxes_of).collect();
+    let boxes_of = |path: &ObjectPath| {
+        let in_reach = |(frame, [low, mut high]): (i32, [DVec3; 2])| {
+            let fastest = path.step_to(frame).1 * fps;
+            if let Some(top) = path.top_of_snow().filter(|_| gravity < 0.0) {
+                high.y = high.y.min(top - fastest * fastest / (2.0 * gravity));
+            }
+            (low.y <= high.y).then_some((frame, [low, high]))
+        };
+        united(path.boxes_near_snow().filter_map(in_reach).map(interval_box))
+    };
+    let pushing = paths.iter().filter(|path| path.object().role.pushes());
+    let mut boxes: Vec<(usize, [DVec3; 2])> = pushing.flat_map(boxes_of).collect();
     boxes.sort_by_key(|(at, _)| *at);
     let tiles = |[low, high]: &[DVec3; 2]| (high - low).iter().map(|side| side / tile).product::<f64>();
     let largest = boxes.iter().map(|(_, corners)| tiles(corners)).fold(0.0, f64::max);

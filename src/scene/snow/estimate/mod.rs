@@ -4,3 +4,5 @@ pub(in crate::scene::snow) mod disk;
 pub(in crate::scene::snow) mod grains;
 pub(in crate::scene::snow) mod memory;
 pub(in crate::scene::snow) mod mist;
+pub(in crate::scene::snow) mod peak;
+pub(in crate::scene::snow) mod removed;

@@ -1,5 +1,7 @@
 //! The path of an object over a shot, and warnings about it.
 
+use std::ops::RangeInclusive;
+
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -133,13 +135,41 @@ impl<'a> ObjectPath<'a> {
         Some([first.frame, last.frame])
     }
 
-    /// Minimum and maximum corner (m) at each frame from the first to the last at which its bounds overlap those of the snow; none for an
-    /// object that pushes no grains.
+    /// The object in the scene.
+    pub fn object(&self) -> &Object {
+        self.object
+    }
+
+    /// Its mesh and motion.
+    pub fn body(&self) -> &Body {
+        self.body
+    }
+
+    /// Height of the snow's highest point (m), if it is known.
+    pub fn top_of_snow(&self) -> Option<f64> {
+        self.inputs.top()
+    }
+
+    /// The frames from the first to the last at which its bounds overlap those of the snow.
+    #[expect(clippy::reversed_empty_ranges, reason = "no frame")]
+    pub fn frames_near_snow(&self) -> RangeInclusive<i32> {
+        self.touches().map_or(1..=0, |[first, last]| first..=last)
+    }
+
+    /// Minimum and maximum corner (m) at each of these frames.
     pub fn boxes_near_snow(&self) -> impl Iterator<Item = (i32, [DVec3; 2])> {
-        let touches = self.touches().filter(|_| self.object.role.pushes());
-        let is_near = move |frame: i32| touches.is_some_and(|[first, last]| (first..=last).contains(&frame));
-        let near = self.extents.iter().filter(move |extent| is_near(extent.frame));
+        let frames = self.frames_near_snow();
+        let near = self.extents.iter().filter(move |extent| frames.contains(&extent.frame));
         near.map(|extent| (extent.frame, [extent.low, extent.high]))
+    }
+
+    /// The times (s) of the frame before a frame and of its own, and the longest path of a vertex between them (m). The first frame has
+    /// none before it.
+    pub fn step_to(&self, frame: i32) -> ([f64; 2], f64) {
+        let shot = self.scene.shot;
+        let first = shot.frames.first;
+        let times = [(frame - 1).max(first), frame].map(|frame| shot.time(frame));
+        (times, self.extents[(frame - first) as usize].moved)
     }
 
     /// Count of holes at the first frame.

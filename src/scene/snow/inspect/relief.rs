@@ -57,7 +57,7 @@ impl Relief {
         Some(Self { ground, snow })
     }
 
-    /// Heights (m) of the ground and of the snow's top at a position; `None` outside them. Static objects are ignored.
+    /// Heights (m) of the ground and of the snow's top at x and z (m); `None` outside them. Static objects are ignored.
     pub fn at(&self, x: f64, z: f64) -> Option<(f64, f64)> {
         let ground = match &self.ground {
             Surface::Plane { height, area: [x0, z0, x1, z1] } => {

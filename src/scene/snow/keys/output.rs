@@ -18,8 +18,8 @@ pub const OUTPUT_KEYS: &[Key] = &[
     key(BASE, "output", "half", Flag, or("false")).means("16-bit values of the base and of what was removed, for rendering only"),
     key(BASE, "output", "removed", Choices(&["vdb"]), or("[\"vdb\"]"))
         .means("removed/removed.%04d.vdb: the snow that each frame removed"),
-    key(GRAINS, "output", "grains", Choices(&["vdb", "ply", "usd"]), or("[\"vdb\", \"usd\"]"))
-        .means("grains/grains.%04d.vdb: points with v, id, active, trapped, pscale, source_frame, rest; the same as \"usd\", \"ply\""),
+    key(GRAINS, "output", "grains", Choices(&["usd", "vdb", "ply"]), optional("[\"usd\"]"))
+        .means("\"usd\", \"vdb\", \"ply\": grains/, points with v, id, active, trapped, pscale, source_frame, rest; default: \"usd\", and \"vdb\" with grains_mode = \"delta\""),
     key(GRAINS, "output", "grains_mode", Choice(&["full", "delta"]), or("\"full\""))
         .means("full, or delta: .vdb files of the first and every 24th frame whole, then only changes (`frazil vdb rebuild`)"),
     key(MIST, "output", "mist", Choices(&["vdb"]), or("[\"vdb\"]"))

@@ -51,8 +51,8 @@ pub fn check_volumes(table: &Table, values: &Values, output: &Output) -> Result<
         let what = format!("leaves out what `{reader}` reads of every frame: exact values of the base");
         return Err(table.error(key, what));
     }
-    if needs.grains && !output.grains_vdb {
-        let what = format!("leaves out the .vdb files that `{reader}` is made from: add \"vdb\"");
+    if needs.grains && !output.grains_readable() {
+        let what = format!("leaves out the files that `{reader}` is made from: add \"usd\" or \"vdb\"");
         return Err(table.error("grains", what));
     }
     if needs.mist && !output.mist {

@@ -11,9 +11,8 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::points::{Column, Points, Values};
 use crate::io::files::hash::Hasher;
-use crate::io::mesh::extension;
 use crate::scene::Scene;
-use crate::scene::run::{DoneFrames, FrameFiles};
+use crate::scene::run::FrameFiles;
 use crate::scene::vdb_metadata::metadata;
 use crate::vdb::file::{self, WriteOptions};
 use crate::vdb::{MetaValue, points};
@@ -21,11 +20,11 @@ use crate::vdb::{MetaValue, points};
 /// Interval (frames) of complete files.
 pub(in crate::scene::snow) const WHOLE_EVERY: i32 = 24;
 /// Metadata of a file of changes: the previous frame.
-const SINCE: &str = "frazil:changes_since";
+pub(super) const SINCE: &str = "frazil:changes_since";
 /// Metadata of a file of changes: the identities that are gone since then.
-const GONE: &str = "frazil:gone";
+pub(super) const GONE: &str = "frazil:gone";
 /// Metadata of a file of changes: [`hash_of`] the previous frame's grains.
-const BEFORE_HASH: &str = "frazil:changes_of";
+pub(super) const BEFORE_HASH: &str = "frazil:changes_of";
 /// Identities are less than this.
 const ID_END: i64 = 1 << 32;
 
@@ -80,8 +79,13 @@ const TRAPPED: &str = "trapped";
 const NONE_TRAPPED: Values = Values::Bool(Column::Uniform(false));
 
 fn ids(points: &Points) -> Vec<i64> {
-    match points.attribute("id") {
-        Some(Values::Long(column)) => (0..points.count()).map(|point| column.get(point)).collect(),
+    ids_of(points.count(), points.attribute("id"))
+}
+
+/// The identities of `count` grains from the values of their attribute `id`; none if it has others.
+pub(super) fn ids_of(count: usize, values: Option<&Values>) -> Vec<i64> {
+    match values {
+        Some(Values::Long(column)) => (0..count).map(|grain| column.get(grain)).collect(),
         _ => Vec::new(),
     }
 }
@@ -112,10 +116,10 @@ pub(in crate::scene::snow) fn write(
 }
 
 /// Name of the grid, of the folder and of the files in it.
-const NAME: &str = "grains";
+pub(super) const NAME: &str = "grains";
 
 /// A hash of the identities and positions of grains in the order of [`ordered`].
-fn hash_of(points: &Points) -> String {
+pub(super) fn hash_of(points: &Points) -> String {
     let mut hash = Hasher::default();
     for id in ids(points) {
         hash.add(&id.to_le_bytes());
@@ -210,7 +214,7 @@ fn is_same(before: &Points, old_index: usize, after: &Points, point: usize) -> b
 ///
 /// # Errors
 /// Changes that belong to other points.
-fn apply_changes(mut points: Points, mut changed: Points, gone: &[Run]) -> Result<Points> {
+pub(super) fn apply_changes(mut points: Points, mut changed: Points, gone: &[Run]) -> Result<Points> {
     let (old, new) = (ids(&points), ids(&changed));
     let old_indices: Vec<Option<usize>> = new.iter().map(|id| old.binary_search(id).ok()).collect();
     set_birth_attributes(&mut changed, Some(&points), &old_indices);
@@ -243,11 +247,11 @@ fn apply_changes(mut points: Points, mut changed: Points, gone: &[Run]) -> Resul
 }
 
 /// Consecutive identities.
-type Run = RangeInclusive<i64>;
+pub(super) type Run = RangeInclusive<i64>;
 
 /// What a file of changes says of the previous frame's grains: the identities that are gone, and the [`hash_of`] all grains if present.
 /// `None` if the file is complete.
-fn previous_record(
+pub(super) fn previous_record(
     frame: i32,
     metadata: &[(String, MetaValue)],
 ) -> Result<Option<(Vec<Run>, Option<String>)>> {
@@ -296,106 +300,6 @@ fn runs_from_text(text: &str) -> Option<Vec<Run>> {
         out.push(low..=high);
     }
     Some(out)
-}
-
-/// Reads complete grains from a cache, frame by frame.
-pub struct RebuildGrains {
-    stored: DoneFrames,
-    reader: GrainReader,
-}
-
-impl RebuildGrains {
-    /// Opens a cache.
-    ///
-    /// # Errors
-    /// As [`DoneFrames::read`].
-    pub fn open(folder: &Path) -> Result<Self> {
-        Ok(Self { stored: DoneFrames::read(folder, NAME)?, reader: GrainReader::default() })
-    }
-
-    /// The stored frames.
-    pub fn stored(&self) -> &DoneFrames {
-        &self.stored
-    }
-
-    /// The bytes of a frame's file as `grains_mode = "full"` writes it, except for the hash of the settings in its metadata.
-    /// If frames ascend from call to call, none is read twice.
-    ///
-    /// # Errors
-    /// A frame that does not exist; a file that was changed since it was written; cancel.
-    pub fn bytes(&mut self, ctx: &Context, frame: i32, options: &WriteOptions) -> Result<Vec<u8>> {
-        let (points, mut metadata) = self.reader.points(ctx, &self.stored, frame)?;
-        metadata
-            .retain(|(key, _)| key.starts_with("frazil:") && ![SINCE, GONE, BEFORE_HASH].contains(&&key[..]));
-        points::to_bytes(ctx, NAME, points, &WriteOptions { metadata, ..options.clone() })
-    }
-
-    /// The grains after a frame, sorted by identity. If frames ascend from call to call, none is read twice.
-    ///
-    /// # Errors
-    /// As [`RebuildGrains::bytes`].
-    pub fn points(&mut self, ctx: &Context, frame: i32) -> Result<&Points> {
-        Ok(self.reader.points(ctx, &self.stored, frame)?.0)
-    }
-}
-
-/// Reads complete grains frame by frame, and keeps the last ones, so that the next frame reads only its changes.
-#[derive(Default)]
-pub(in crate::scene::snow) struct GrainReader {
-    last: Option<(i32, Points)>,
-}
-
-/// Metadata of a file.
-type Metadata = Vec<(String, MetaValue)>;
-
-impl GrainReader {
-    /// The grains after a frame, sorted by identity, with the metadata of its file. If frames ascend from call to call, none is read
-    /// twice.
-    ///
-    /// # Errors
-    /// A frame that does not exist; a file that was changed since it was written; cancel.
-    pub fn points(&mut self, ctx: &Context, stored: &DoneFrames, frame: i32) -> Result<(&Points, Metadata)> {
-        let (mut later, mut metadata, mut at) = (Vec::new(), None, frame);
-        let mut points = loop {
-            ctx.check()?;
-            if let Some((_, points)) = self.last.take_if(|(last, _)| *last == at && at < frame) {
-                break points;
-            }
-            let (points, file_metadata) = read(stored, at)?;
-            let record = previous_record(at, &file_metadata).map_err(|error| in_frame(stored, at, error))?;
-            metadata.get_or_insert(file_metadata);
-            match record {
-                None => break points,
-                Some((gone, before_hash)) => later.push((at, points, gone, before_hash)),
-            }
-            at -= 1;
-        };
-        for (at, changed, gone, before_hash) in later.into_iter().rev() {
-            if before_hash.is_some_and(|before_hash| before_hash != hash_of(&points)) {
-                return Err(in_frame(stored, at, Error::argument("holds changes of other grains")));
-            }
-            points = apply_changes(points, changed, &gone).map_err(|error| in_frame(stored, at, error))?;
-        }
-        Ok((&self.last.insert((frame, points)).1, metadata.unwrap_or_default()))
-    }
-}
-
-fn in_frame(stored: &DoneFrames, frame: i32, error: Error) -> Error {
-    error.in_file_at(stored.folder(), format!("frame {frame} of grains "))
-}
-
-/// The points of a frame's file, with its metadata.
-fn read(stored: &DoneFrames, frame: i32) -> Result<(Points, Metadata)> {
-    let path = stored.file(frame, NAME)?;
-    if extension(&path) != "vdb" {
-        return Err(Error::file(stored.folder(), format!("frame {frame} has no .vdb file in {NAME}/")));
-    }
-    let points = ordered(points::read_own(&path, None)?);
-    let ids = ids(&points);
-    if ids.len() != points.count() || !ids.is_sorted_by(|one, next| one < next) {
-        return Err(Error::file(path, "has grains that share an identity or have none (id)"));
-    }
-    Ok((points, file::metadata(&path)?))
 }
 
 #[cfg(test)]

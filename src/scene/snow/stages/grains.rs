@@ -16,7 +16,7 @@ use crate::scene::run::{
     DoneFrames, FileKind, FrameFiles, Reads, Report, Settings, Stage, StepTarget, Stepped, Stepping,
 };
 use crate::scene::schema::declaration::OBJECT;
-use crate::scene::snow::estimate::grains::Forecast;
+use crate::scene::snow::estimate::grains::{Forecast, Removed};
 use crate::scene::snow::grain_params::params;
 use crate::scene::snow::initial_grains;
 use crate::scene::snow::inputs::Inputs;
@@ -233,7 +233,8 @@ impl Stepping for Grains<'_> {
 
     fn precheck(&self, ctx: &Context, upstream: &[DoneFrames], last: i32) -> Result<()> {
         let [base] = upstream else { return Err(Error::Internal("grains read one stage".into())) };
-        let Some(forecast) = Forecast::of(self.scene, self.inputs, base, last)? else { return Ok(()) };
+        let removed = Removed::by_base(self.scene, base, last)?;
+        let Some(forecast) = Forecast::of(self.scene, self.inputs, &removed)? else { return Ok(()) };
         log::info!(
             "grains: {}, {:.1} MB of memory, {:.1} MB of files",
             forecast.count(),

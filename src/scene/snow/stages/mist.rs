@@ -3,13 +3,14 @@
 use serde_json::json;
 
 use super::frames::LayerReader;
-use super::grain_files::GrainReader;
+use super::grain_reader::GrainReader;
 use super::settings;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::flow::{Solids, Tiles};
 use crate::geometry::points::Values;
-use crate::geometry::{DVec3, Points, TriMesh};
+use crate::geometry::{DVec3, TriMesh};
+use crate::io::particles::ParticleData;
 use crate::io::usd::{Field, Holds};
 use crate::motion::{Keys, Rigid};
 use crate::scene::run::settings::settings_of_first_state;
@@ -83,14 +84,14 @@ impl Mist<'_> {
         let starts = match cached.take() {
             Some((at, starts)) if at == frame - 1 => starts,
             _ => {
-                let (before, _) = grains.points(ctx, stored, frame - 1)?;
-                starts_of(before).map_err(|error| with_frame(frame - 1, error))?
+                let before = grains.particles(ctx, stored, frame - 1)?;
+                starts_of(&before).map_err(|error| with_frame(frame - 1, error))?
             }
         };
-        let (points, _) = grains.points(ctx, stored, frame)?;
-        let sources = sources_of(points, &starts, frame, mist.params());
+        let grains = grains.particles(ctx, stored, frame)?;
+        let sources = sources_of(&grains, &starts, frame, mist.params());
         let sources = sources.map_err(|error| with_frame(frame, error))?;
-        *cached = Some((frame, starts_of(points).map_err(|error| with_frame(frame, error))?));
+        *cached = Some((frame, starts_of(&grains).map_err(|error| with_frame(frame, error))?));
         Ok(sources)
     }
 
@@ -137,29 +138,36 @@ impl Mist<'_> {
 }
 
 /// The identities of grains, ascending, with their positions and velocities.
-fn starts_of(points: &Points) -> Result<Vec<(i64, Start)>> {
+fn starts_of(grains: &ParticleData) -> Result<Vec<(i64, Start)>> {
     // A file without points has no attributes.
-    if points.count() == 0 {
+    if grains.positions.is_empty() {
         return Ok(Vec::new());
     }
-    let (Values::Vector(velocities), Values::Long(ids)) = (attribute(points, "v")?, attribute(points, "id")?)
+    let (Values::Vector(velocities), Values::Long(ids)) = (attribute(grains, "v")?, attribute(grains, "id")?)
     else {
         return Err(Error::argument("have attributes v and id of other types"));
     };
-    let start = |point| Start { position: points.position(point), velocity: velocities.get(point) };
-    Ok((0..points.count()).map(|point| (ids.get(point), start(point))).collect())
+    let start = |(grain, position): (usize, &DVec3)| {
+        (ids.get(grain), Start { position: *position, velocity: velocities.get(grain) })
+    };
+    Ok(grains.positions.iter().enumerate().map(start).collect())
 }
 
-fn attribute<'a>(points: &'a Points, name: &str) -> Result<&'a Values> {
-    points.attribute(name).ok_or_else(|| Error::argument(format!("have no attribute {name}")))
+fn attribute<'a>(grains: &'a ParticleData, name: &str) -> Result<&'a Values> {
+    grains.attribute(name).ok_or_else(|| Error::argument(format!("have no attribute {name}")))
 }
 
 /// Grains after a frame as sources of mist, with their positions before it; grains that are too slow are left out.
-fn sources_of(points: &Points, starts: &[(i64, Start)], frame: i32, params: &Params) -> Result<Vec<Source>> {
-    if points.count() == 0 {
+fn sources_of(
+    grains: &ParticleData,
+    starts: &[(i64, Start)],
+    frame: i32,
+    params: &Params,
+) -> Result<Vec<Source>> {
+    if grains.positions.is_empty() {
         return Ok(Vec::new());
     }
-    let all = ["v", "id", "pscale", "source_frame", "rest"].map(|name| attribute(points, name));
+    let all = ["v", "id", "pscale", "source_frame", "rest"].map(|name| attribute(grains, name));
     let [v, id, pscale, source_frame, rest] = all;
     let (
         Values::Vector(velocities),
@@ -171,23 +179,23 @@ fn sources_of(points: &Points, starts: &[(i64, Start)], frame: i32, params: &Par
     else {
         return Err(Error::argument("have attributes of other types"));
     };
-    let source = |point: usize| {
-        let start = match starts.binary_search_by_key(&ids.get(point), |(id, _)| *id) {
+    let source = |(grain, position): (usize, &DVec3)| {
+        let start = match starts.binary_search_by_key(&ids.get(grain), |(id, _)| *id) {
             Ok(index) => Some(starts[index].1),
             // It was born in this frame, at rest.
-            Err(_) if births.get(point) == frame => {
-                Some(Start { position: DVec3::from(rests.get(point).map(f64::from)), velocity: [0.0; 3] })
+            Err(_) if births.get(grain) == frame => {
+                Some(Start { position: DVec3::from(rests.get(grain).map(f64::from)), velocity: [0.0; 3] })
             }
             Err(_) => None,
         };
         Source {
-            position: points.position(point),
-            velocity: velocities.get(point),
-            radius: f64::from(radii.get(point)),
+            position: *position,
+            velocity: velocities.get(grain),
+            radius: f64::from(radii.get(grain)),
             start,
         }
     };
-    Ok((0..points.count()).map(source).filter(|source| source.raises(params)).collect())
+    Ok(grains.positions.iter().enumerate().map(source).filter(|source| source.raises(params)).collect())
 }
 
 /// A mesh as a body at rest; `None` if it has no triangles.

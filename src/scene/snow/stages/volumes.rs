@@ -3,13 +3,14 @@
 use serde_json::{Map, Value, json};
 
 use super::frames::LayerReader;
-use super::grain_files::GrainReader;
+use super::grain_reader::GrainReader;
 use super::mist;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::points::Values;
-use crate::geometry::{DVec3, Points, TriMesh};
+use crate::geometry::{DVec3, TriMesh};
 use crate::io::mesh;
+use crate::io::particles::ParticleData;
 use crate::io::records::manifest::Keeps;
 use crate::io::usd::materials::Look;
 use crate::io::usd::{self, ClipPrims, Clips, Field, Holds, MeshPrim, Shading};
@@ -46,7 +47,7 @@ pub struct State {
 struct Source<'s> {
     frame: i32,
     base: Option<&'s FloatGrid>,
-    grains: Option<&'s Points>,
+    grains: Option<ParticleData>,
     mist: Option<FloatGrid>,
 }
 
@@ -96,7 +97,7 @@ impl<'a> Volumes<'a> {
             source.base = Some(&layer.after(ctx, stored, to.frame)?.surface);
         }
         if self.needs.grains {
-            source.grains = Some(grains.points(ctx, self.stored(to.upstream, "grains")?, to.frame)?.0);
+            source.grains = Some(grains.particles(ctx, self.stored(to.upstream, "grains")?, to.frame)?);
         }
         if self.needs.mist {
             source.mist = Some(mist::density(self.stored(to.upstream, "mist")?, to.frame)?);
@@ -116,9 +117,9 @@ impl<'a> Volumes<'a> {
         if let Some(surface) = source.base.filter(|_| self.output.fog_base) {
             add(fog::base(ctx, surface)?, names[0])?;
         }
-        if let Some(points) = source.grains.filter(|_| self.output.fog_grains) {
+        if let Some(grains) = source.grains.as_ref().filter(|_| self.output.fog_grains) {
             let radius = self.radius();
-            add(fog::grains(ctx, &positions(points, |_| true), radius, fog::VOXEL * radius)?, names[1])?;
+            add(fog::grains(ctx, &grains.positions, radius, fog::VOXEL * radius)?, names[1])?;
         }
         if let Some(mist) = source.mist.take() {
             add(mist, names[2])?;
@@ -127,10 +128,13 @@ impl<'a> Volumes<'a> {
     }
 
     /// Unites the base with resting grains.
-    fn snow(&self, ctx: &Context, surface: &FloatGrid, grains: Option<&Points>) -> Result<FloatGrid> {
-        let Some(points) = grains else { return surface.deep_copy() };
-        let resting = match points.attribute("active") {
-            Some(Values::Bool(active)) => positions(points, |point| !active.get(point)),
+    fn snow(&self, ctx: &Context, surface: &FloatGrid, grains: Option<&ParticleData>) -> Result<FloatGrid> {
+        let Some(grains) = grains else { return surface.deep_copy() };
+        let resting: Vec<DVec3> = match grains.attribute("active") {
+            Some(Values::Bool(active)) => {
+                let all = grains.positions.iter().enumerate();
+                all.filter(|(grain, _)| !active.get(*grain)).map(|(_, position)| *position).collect()
+            }
             // A file without points has no attributes.
             _ => Vec::new(),
         };
@@ -163,7 +167,7 @@ impl<'a> Volumes<'a> {
         }
         let Some(surface) = source.base else { return Ok((files, results)) };
         if self.output.snow {
-            let grid = ctx.phase("snow", || self.snow(ctx, surface, source.grains))?;
+            let grid = ctx.phase("snow", || self.snow(ctx, surface, source.grains.as_ref()))?;
             results.insert("snow_voxels".into(), json!(grid.active_voxels()));
             files.push(ctx.phase("pack", || Packed::grids("snow", &[&grid], &options))?);
         }
@@ -194,11 +198,6 @@ impl<'a> Volumes<'a> {
         }
         Ok(files)
     }
-}
-
-/// Positions (m) of some points.
-fn positions(points: &Points, is_wanted: impl Fn(usize) -> bool) -> Vec<DVec3> {
-    (0..points.count()).filter(|point| is_wanted(*point)).map(|point| points.position(point)).collect()
 }
 
 /// Names of the fog's grids of base, grains and mist. A single one has the name that smoke shaders look for.

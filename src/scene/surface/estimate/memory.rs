@@ -46,6 +46,8 @@ use crate::surface::Particles;
 
 /// Bytes that every run takes.
 const FIXED: f64 = 64e6;
+/// Share of the other bytes that is expected to be used: not all of them are at the same time, and less of the mesh changes.
+const EXPECTED: f64 = 0.65;
 /// Bytes of a particle in each frame in memory: position, velocity, id.
 const PARTICLE: [f64; 3] = [24.0, 12.0, 8.0];
 /// Bytes of a particle's path in a step, and of the velocities at both its ends.
@@ -122,8 +124,14 @@ impl ParticleMaxima {
         self.edge = cell * spacing;
     }
 
-    /// Estimates the memory (bytes) of a run over `files` files.
-    pub fn estimate(&self, surface: &Surface, files: usize, detail: &DetailedMesh, frame: &FrameSize) -> u64 {
+    /// Estimates the memory (bytes) of a run over `files` files: at most, and as expected.
+    pub fn estimate(
+        &self,
+        surface: &Surface,
+        files: usize,
+        detail: &DetailedMesh,
+        frame: &FrameSize,
+    ) -> [u64; 2] {
         let is_between = surface.speed.fract() != 0.0 || surface.offset.fract() != 0.0;
         // The particles of the first frame are kept; between two files both ends of a step are interpolated.
         let frames = files.min(CACHED_FILES) + 1 + if is_between { 2 } else { 0 };
@@ -131,7 +139,8 @@ impl ParticleMaxima {
         let particles = frames as f64 * self.frame + self.paths + self.work;
         let rebuilding =
             if surface.rebuild { self.rebuilding(detail, surface.frames_ahead() - 1) } else { 0.0 };
-        (FIXED + particles + mesh + rebuilding) as u64 + frame.largest()
+        let rest = particles + mesh + rebuilding + frame.largest() as f64;
+        [1.0, EXPECTED].map(|share| (FIXED + share * rest) as u64)
     }
 
     /// Additional bytes if the mesh is rebuilt, with `coming` frames kept after the next.

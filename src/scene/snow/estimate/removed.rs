@@ -1,0 +1,209 @@
+//! Forecast of the snow that objects remove in each frame, before the base is made: the objects are posed, and each column of snow loses what
+//! lies between the lowest and the highest surface that has been there. Ragged edges and static objects are ignored.
+
+use nalgebra::Vector2;
+use rayon::prelude::*;
+
+use crate::context::Context;
+use crate::error::Result;
+use crate::geometry::DVec3;
+use crate::motion::Poses;
+use crate::scene::Scene;
+use crate::scene::snow::inspect::object_path::ObjectPath;
+use crate::scene::snow::inspect::relief::Relief;
+
+/// Maximum count of columns: in larger areas they are wider than the cells of the snow.
+const MAX_COLUMNS: f64 = 262_144.0;
+/// Path of a vertex between two poses, as a multiple of a column's edge, and the maximum number of poses in a frame.
+const STEP: f64 = 2.0;
+const MAX_POSES: f64 = 16.0;
+/// Number of consecutive frames that one task poses, and those that are in memory at once.
+const BATCH: usize = 4;
+const IN_MEMORY: usize = 64;
+
+type DVec2 = Vector2<f64>;
+/// The lowest and highest y (m) of a surface in a column.
+type Span = [f64; 2];
+
+/// Volume (m3) that all objects remove in each frame of the shot; in the first one, that of their first poses.
+///
+/// # Errors
+/// A pose that cannot be computed; cancel.
+pub(in crate::scene::snow) fn removed(
+    ctx: &Context,
+    scene: &Scene,
+    relief: &Relief,
+    paths: &[ObjectPath],
+    cell: f64,
+) -> Result<Vec<f64>> {
+    let frames: Vec<i32> = scene.shot.frames.iter().collect();
+    let removers: Vec<&ObjectPath> = paths.iter().filter(|path| path.object().role.removes()).collect();
+    let Some(columns) = Columns::around(&removers, cell) else { return Ok(vec![0.0; frames.len()]) };
+    let mut snow: Vec<Snow> = vec![Snow::Unknown; columns.len()];
+    let mut out = Vec::with_capacity(frames.len());
+    for frames in frames.chunks(IN_MEMORY) {
+        let of_batch = |batch: &[i32]| batch_spans(ctx, &columns, &removers, batch);
+        let spans: Vec<Vec<Vec<(usize, Span)>>> =
+            frames.par_chunks(BATCH).map(of_batch).collect::<Result<_>>()?;
+        for spans in spans.into_iter().flatten() {
+            let lost: f64 = spans
+                .into_iter()
+                .map(|(column, span)| {
+                    snow[column].lose(span, || {
+                        let [x, z] = columns.centre(column).into();
+                        relief.at(x, z)
+                    })
+                })
+                .sum();
+            out.push(lost * columns.edge * columns.edge);
+        }
+    }
+    Ok(out)
+}
+
+/// The snow of a column.
+#[derive(Clone, Copy)]
+enum Snow {
+    /// No object was there yet.
+    Unknown,
+    /// There is none.
+    None,
+    /// Heights of the ground and of the top, and between which heights objects have been (m).
+    Layer { bottom: f64, top: f64, cut: Span },
+}
+
+impl Snow {
+    /// Removes the snow of a span; returns how much less there is (m). `heights` gives those of ground and top.
+    fn lose(&mut self, span: Span, heights: impl FnOnce() -> Option<(f64, f64)>) -> f64 {
+        if let Self::Unknown = self {
+            *self = heights().map_or(Self::None, |(bottom, top)| Self::Layer {
+                bottom,
+                top,
+                cut: [f64::INFINITY, f64::NEG_INFINITY],
+            });
+        }
+        let Self::Layer { bottom, top, cut } = self else { return 0.0 };
+        let height = |cut: &Span| (cut[1].min(*top) - cut[0].max(*bottom)).max(0.0);
+        let before = height(cut);
+        *cut = [cut[0].min(span[0]), cut[1].max(span[1])];
+        height(cut) - before
+    }
+}
+
+/// Columns that cover the paths of some objects near the snow.
+struct Columns {
+    /// Edge of a column (m).
+    edge: f64,
+    /// Lowest x and z (m).
+    low: DVec2,
+    /// Count along x and z.
+    count: [usize; 2],
+}
+
+impl Columns {
+    /// None if no object comes near the snow.
+    fn around(paths: &[&ObjectPath], cell: f64) -> Option<Self> {
+        let boxes = paths.iter().flat_map(|path| path.boxes_near_snow().map(|(_, corners)| corners));
+        let [low, high] = boxes.reduce(|a, b| [a[0].inf(&b[0]), a[1].sup(&b[1])])?;
+        let (low, size) = (low.xz(), (high - low).xz());
+        // A margin of one column, and no more than the maximum of them.
+        let edge = cell.max((size.x * size.y / MAX_COLUMNS).sqrt()).max(size.max() / MAX_COLUMNS);
+        let count = [size.x, size.y].map(|length| (length / edge).ceil() as usize + 1);
+        Some(Self { edge, low: low - DVec2::repeat(0.5 * edge), count })
+    }
+
+    fn len(&self) -> usize {
+        self.count[0] * self.count[1]
+    }
+
+    /// x and z of the centre of a column (m).
+    fn centre(&self, column: usize) -> DVec2 {
+        let [x, z] = [column % self.count[0], column / self.count[0]].map(|at| at as f64 + 0.5);
+        self.low + self.edge * DVec2::new(x, z)
+    }
+
+    /// Widens the spans of the columns whose centres lie below or above a triangle.
+    fn widen(&self, [a, b, c]: [DVec3; 3], spans: &mut Spans) {
+        let flat = |p: DVec3| (p.xz() - self.low) / self.edge - DVec2::repeat(0.5);
+        let (p, u, v) = (flat(a), flat(b) - flat(a), flat(c) - flat(a));
+        let area = u.perp(&v);
+        if area == 0.0 {
+            return;
+        }
+        let low = p + DVec2::zeros().inf(&u).inf(&v);
+        let high = p + DVec2::zeros().sup(&u).sup(&v);
+        let range = |axis: usize| {
+            let end = (high[axis].floor() + 1.0).clamp(0.0, self.count[axis] as f64);
+            low[axis].ceil().max(0.0) as usize..end as usize
+        };
+        for z in range(1) {
+            for x in range(0) {
+                let offset = DVec2::new(x as f64, z as f64) - p;
+                let [s, t] = [offset.perp(&v) / area, u.perp(&offset) / area];
+                if s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
+                    spans.widen(z * self.count[0] + x, a.y + s * (b.y - a.y) + t * (c.y - a.y));
+                }
+            }
+        }
+    }
+}
+
+/// Spans of the columns where surfaces are, in the order in which they were met.
+struct Spans {
+    /// Of all columns; empty ones are reversed.
+    all: Vec<[f64; 2]>,
+    met: Vec<usize>,
+}
+
+impl Spans {
+    const EMPTY: Span = [f64::INFINITY, f64::NEG_INFINITY];
+
+    fn new(columns: usize) -> Self {
+        Self { all: vec![Self::EMPTY; columns], met: Vec::new() }
+    }
+
+    fn widen(&mut self, column: usize, y: f64) {
+        let [low, high] = &mut self.all[column];
+        if *low > *high {
+            self.met.push(column);
+        }
+        (*low, *high) = (low.min(y), high.max(y));
+    }
+
+    /// The spans, which are empty from then on.
+    fn take(&mut self) -> Vec<(usize, Span)> {
+        let all = &mut self.all;
+        self.met.drain(..).map(|column| (column, std::mem::replace(&mut all[column], Self::EMPTY))).collect()
+    }
+}
+
+/// The spans that objects have in each frame of a batch: at the poses after the frame before it, and up to its own.
+fn batch_spans(
+    ctx: &Context,
+    columns: &Columns,
+    paths: &[&ObjectPath],
+    batch: &[i32],
+) -> Result<Vec<Vec<(usize, Span)>>> {
+    let mut spans = Spans::new(columns.len());
+    let mut out = vec![Vec::new(); batch.len()];
+    for path in paths {
+        let (motion, near) = (path.body().motion(), path.frames_near_snow());
+        for (frame, out) in batch.iter().zip(&mut out) {
+            ctx.check()?;
+            let Some((times, moved)) = near.contains(frame).then(|| path.step_to(*frame)) else { continue };
+            let poses = (moved / (STEP * columns.edge)).ceil().clamp(1.0, MAX_POSES) as usize;
+            let mut pose = Poses::start(motion, times[1])?;
+            for at in 1..=poses {
+                if at > 1 {
+                    let part = (poses + 1 - at) as f64 / poses as f64;
+                    pose.go_to(times[0] + part * (times[1] - times[0]))?;
+                }
+                let positions = pose.now();
+                let corners = |triangle: &[u32; 3]| triangle.map(|vertex| positions[vertex as usize]);
+                motion.triangles().iter().for_each(|triangle| columns.widen(corners(triangle), &mut spans));
+            }
+            out.append(&mut spans.take());
+        }
+    }
+    Ok(out)
+}
