@@ -3,6 +3,5 @@
 mod cli;
 
 fn main() -> std::process::ExitCode {
-    frazil::context::return_large_arrays();
     cli::run()
 }

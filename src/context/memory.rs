@@ -22,17 +22,6 @@ pub fn release_freed_memory() {
     }
 }
 
-/// For a program that runs for long: large arrays that are freed go back to the system at once. By default, glibc keeps arrays of up to 32 MB
-/// for each thread that allocated them, up to three times what is in use; this costs some 2 % of the time. A library leaves it to its program.
-pub fn return_large_arrays() {
-    #[cfg(all(target_os = "linux", target_env = "gnu"))]
-    // SAFETY: it may be called from any thread at any time.
-    unsafe {
-        const MEGABYTE: i32 = 1 << 20;
-        libc::mallopt(libc::M_MMAP_THRESHOLD, MEGABYTE);
-    }
-}
-
 /// The line `NAME   1234 kB` in bytes.
 fn kilobytes_of(text: &str, name: &str) -> Option<u64> {
     let line = text.lines().find_map(|line| line.strip_prefix(name))?;

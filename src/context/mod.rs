@@ -16,7 +16,7 @@ use locking::lock;
 
 pub use cancel::Running;
 pub(crate) use memory::release_freed_memory;
-pub use memory::{machine_memory, peak_memory, return_large_arrays};
+pub use memory::{machine_memory, peak_memory};
 pub use phases::{PhaseTime, Phases};
 pub use pool::{MAX_THREADS, Pool};
 pub use progress::Progress;

@@ -135,7 +135,12 @@ impl Source {
             #[cfg(not(feature = "vdb"))]
             return crate::cli::needs_openvdb(path);
         }
-        Ok(Pattern::parse(path).map_or_else(|| Self::File(path.to_path_buf()), Self::Sequence))
+        if let Some(pattern) = Pattern::parse(path) {
+            return Ok(Self::Sequence(pattern));
+        }
+        // Before options are found to be idle for such a file, which may be meant as a folder.
+        std::fs::metadata(path).map_err(|error| Error::io(path, "read", error))?;
+        Ok(Self::File(path.to_path_buf()))
     }
 
     /// Frames per second of a shot; none for other inputs.

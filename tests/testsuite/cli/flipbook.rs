@@ -244,6 +244,7 @@ fn what_cannot_be_drawn_is_said_before_anything_is_written() {
         ("first last -o p.gif", &["no frame in common"]),
         ("first last -o p.png", &["no frame in common"]),
         ("shot -o shot/grains/grains.0002.vdb", &["grains.0002.vdb", ".png", ".gif"]),
+        ("nowhere/ --frame 3 -o p.png", &["nowhere", "no such file"]),
     ];
     for (arguments, words) in refused {
         fails(folder, &format!("preview {arguments}"), 2, words);
