@@ -2,7 +2,7 @@
 
     blender -b --factory-startup --python examples/blender/render_shot.py -- cache/ 48 frame.png --eye 2,1.2,2 --target 0,0.2,0
 
-The shot needs `[output] grains = ["vdb", "ply"]`, as Blender reads no points from .vdb files; with `mesh = ["ply"]` the base is
+The shot needs `[output] grains = ["usd", "ply"]`, as this script reads points from .ply files; with `mesh = ["ply"]` the base is
 that mesh, else Blender meshes base/*.vdb itself. With `objects = ["ply"]` the objects are drawn too. What a shot does not have is
 left out. Without -b the scene stays open, to light and shade it further. Positions are in metres with Y up, as everywhere in frazil.
 """

@@ -207,3 +207,48 @@ fn batch_spans(
     }
     Ok(out)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_triangle_is_over_as_many_columns_as_its_area_and_at_its_own_heights() {
+        let columns = Columns { edge: 0.01, low: DVec2::new(-0.5, 0.25), count: [100, 150] };
+        let mut spans = Spans::new(columns.len());
+        // In the plane y = 2 x - z, one corner beside the columns.
+        let corner = |x: f64, z: f64| DVec3::new(x, 2.0 * x - z, z);
+        let corners = [corner(-0.4, 0.3), corner(0.3, 0.7), corner(-0.1, 1.8)];
+        columns.widen(corners, &mut spans);
+        let found = spans.take();
+        for (column, [low, high]) in &found {
+            let at = columns.centre(*column);
+            assert!(low == high && (low - (2.0 * at.x - at.y)).abs() < 1e-12, "{at:?} {low} {high}");
+        }
+        // Without the part beyond z = 1.75, which cuts two edges near the last corner.
+        let area = |[a, b, c]: [DVec3; 3]| 0.5 * (b - a).xz().perp(&(c - a).xz()).abs();
+        let beyond = 0.05 / 1.5 * 0.05 / 1.1;
+        let inside = area(corners) * (1.0 - beyond);
+        assert!((found.len() as f64 * 1e-4 / inside - 1.0).abs() < 0.01, "{} {inside}", found.len());
+        // A second surface widens the spans, and what was taken is gone.
+        columns.widen(corners, &mut spans);
+        columns.widen(corners.map(|corner| corner + DVec3::y()), &mut spans);
+        let again = spans.take();
+        assert!(
+            again.len() == found.len()
+                && again.iter().all(|(_, [low, high])| (high - low - 1.0).abs() < 1e-12)
+        );
+    }
+
+    #[test]
+    fn a_column_loses_what_is_between_all_spans_within_its_snow() {
+        let mut snow = Snow::Unknown;
+        let mut lose = |span: Span| (snow.lose(span, || Some((0.1, 0.4))) * 1e9).round() / 1e9;
+        assert_eq!(lose([0.5, 2.0]), 0.0);
+        assert_eq!(lose([0.3, 2.0]), 0.1);
+        assert_eq!(lose([0.35, 1.0]), 0.0);
+        assert_eq!(lose([-1.0, 0.2]), 0.2);
+        assert_eq!(lose([-2.0, 3.0]), 0.0);
+        assert_eq!(Snow::Unknown.lose([0.0, 1.0], || None), 0.0);
+    }
+}
