@@ -37,11 +37,11 @@ impl MovingObjects {
     /// A pose that cannot be read.
     pub fn at(&self, frame: i32) -> Result<Vec<TriMesh>> {
         let mut pose = Vec::new();
-        let mesh = |motion: &Box<dyn Motion>| {
+        let meshes = self.motions.iter().map(|motion| {
             motion.drawn_pose(f64::from(frame) / self.fps, &mut pose)?;
             Ok(TriMesh { positions: to_floats(&pose), triangles: motion.drawn().triangles.to_vec() })
-        };
-        self.motions.iter().map(mesh).collect()
+        });
+        meshes.collect()
     }
 
     /// The lowest and the highest corner (m) of the objects in some frames; `None` without objects.

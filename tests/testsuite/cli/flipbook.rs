@@ -223,7 +223,7 @@ fn what_cannot_be_drawn_is_said_before_anything_is_written() {
     works(folder, "snow shot.toml -o last -q");
     (1..=3)
         .for_each(|frame| fs::remove_file(folder.join(format!("last/state/base.000{frame}.json"))).unwrap());
-    let refused: [(&str, &[&str]); 20] = [
+    let refused: [(&str, &[&str]); 21] = [
         ("shot --frames 3-9 -o p.%04d.png", &["shot", "frame 5", "1 to 4", "base and grains"]),
         ("shot --frames 0-2 -o p.gif", &["shot", "frame 0"]),
         ("shot --frame 1.5 -o p.png", &["shot", "whole frames", "1.5"]),
