@@ -141,7 +141,7 @@ fn camera_in_words(camera: &Camera) -> String {
         format!("{x},{y},{z}")
     };
     let (eye, target) = (point(camera.eye), point(camera.target));
-    format!("camera    --eye={eye} --target={target} --fov {} sees the whole shot\n", camera.fov_deg)
+    format!("camera    --eye={eye} --target={target} --fov {} sees all of the shot\n", camera.fov_deg)
 }
 
 /// Runs the command.
