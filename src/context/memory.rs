@@ -14,6 +14,7 @@ pub fn peak_memory() -> Option<u64> {
 }
 
 /// Gives memory that this process has freed back to the system: glibc keeps most of it for each thread that allocated it.
+#[cfg(feature = "scene")]
 pub fn release_freed_memory() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     // SAFETY: it may be called from any thread at any time.

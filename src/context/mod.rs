@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 use locking::lock;
 
 pub use cancel::Running;
+#[cfg(feature = "scene")]
 pub(crate) use memory::release_freed_memory;
 pub use memory::{machine_memory, peak_memory};
 pub use phases::{PhaseTime, Phases};
