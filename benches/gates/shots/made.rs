@@ -63,11 +63,16 @@ pub struct Made {
 }
 
 impl Shot {
+    /// The scene in the folder of the demo's; an example is put there, beside the meshes that it names in target/demo.
     fn scene(&self, scenes: &Path) -> PathBuf {
         let name = format!("{}.toml", self.name);
         let of_demo = scenes.join(&name);
-        let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes").join(name);
-        if of_demo.exists() { of_demo } else { examples }
+        if !of_demo.exists() {
+            let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes").join(name);
+            let text = std::fs::read_to_string(example).expect("an example");
+            std::fs::write(&of_demo, text.replace("../../target/demo/", "")).expect("a scene");
+        }
+        of_demo
     }
 
     /// The command that makes it in a folder.
