@@ -80,9 +80,9 @@ fn free_in_words(free: Option<u64>) -> String {
     free.map_or(String::new(), |free| format!(" of {} free", size(free)))
 }
 
-/// The memory that is expected to be taken, and the bound by which a run is refused (bytes).
-fn memory_in_words([expected, bound]: [u64; 2], limit: u64) -> String {
-    format!("about {} expected, at most {} of {}", size(expected), size(bound), size(limit))
+/// The memory that a run is expected to take, and the most that it may take, of `what` if that is not all of it (bytes).
+fn memory_in_words([expected, bound]: [u64; 2], what: &str, limit: u64) -> String {
+    format!("about {} expected, at most {}{what}, of {}", size(expected), size(bound), size(limit))
 }
 
 fn warnings_in_words(warnings: &[String]) -> String {

@@ -66,7 +66,7 @@ fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
     let _ = writeln!(
         out,
         "memory    {}",
-        memory_in_words([report.memory_forecast_bytes, report.memory_bytes], limit)
+        memory_in_words([report.memory_forecast_bytes, report.memory_bytes], "", limit)
     );
     let free = free_in_words(free);
     let each = size(report.frame_bytes);

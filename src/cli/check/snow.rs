@@ -63,7 +63,7 @@ fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
     }
     let mist = if report.mist.is_some() { ", without mist" } else { "" };
     let memory = [report.memory_forecast_bytes, report.memory_bytes];
-    let _ = writeln!(out, "memory    {}{mist}", memory_in_words(memory, limit));
+    let _ = writeln!(out, "memory    {}", memory_in_words(memory, mist, limit));
     if let Some(disk) = report.disk_bytes {
         let _ = writeln!(out, "disk      about {}{}{mist}", size(disk), free_in_words(free));
     }

@@ -61,7 +61,7 @@ fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
     let _ = writeln!(
         out,
         "memory    {}",
-        memory_in_words([report.memory_forecast_bytes, report.memory_bytes], limit)
+        memory_in_words([report.memory_forecast_bytes, report.memory_bytes], "", limit)
     );
     let each = size(report.frame_bytes);
     let _ = writeln!(out, "disk      about {}{free}; {each} a frame", size(report.disk_bytes));

@@ -11,7 +11,7 @@ use crate::vdb::file;
 /// Bytes for each column of cells of a layer: two surfaces, each across two leaves, and temporary data while they are made.
 const BYTES_PER_COLUMN: f64 = 260.0;
 /// How many layers the stage base holds: those before and after a frame, and copies and files of whole frames that are written meanwhile.
-const LAYERS_OF_BASE: f64 = 4.0;
+const LAYERS_OF_BASE: f64 = 4.5;
 const LAYERS_OF_CHANGES: f64 = 3.0;
 /// Bytes for each triangle that moves: its poses, and its sweep in a frame.
 const BYTES_PER_TRIANGLE: f64 = 2000.0;
@@ -24,7 +24,7 @@ const BYTES_PER_POINT: u64 = 150;
 const BYTES_PER_FOG_GRAIN: u64 = 1200;
 const BYTES_PER_UNITED_GRAIN: u64 = 700;
 /// Bytes that every run takes.
-pub(super) const FIXED: f64 = 64e6;
+pub(super) const FIXED: f64 = 76e6;
 
 /// Estimates a scene's memory (bytes), without mist, and without grains that come from the snow: their number is known only once the base
 /// exists, see [`Forecast`](super::grains::Forecast).

@@ -1,11 +1,13 @@
 //! Forecast of the memory that a run takes at its peak: what each stage was measured to take, with the stages that are made at the same time.
 //! The bounds by which a run is refused are apart: [`super::memory`].
 
-use super::memory::{self, FIXED, at_once, keeps_changes};
+use super::memory::{self, at_once, keeps_changes};
 use crate::error::Result;
 use crate::scene::Scene;
 use crate::scene::snow::Inputs;
 
+/// Bytes that every run takes.
+const FIXED: f64 = 64e6;
 /// How many layers the stage base takes, and if only changes are written; more where most of the layer changes in each frame.
 const LAYERS: f64 = 2.5;
 const LAYERS_OF_CHANGES: f64 = 2.0;
@@ -35,7 +37,7 @@ pub(in crate::scene::snow) fn peak(scene: &Scene, inputs: &Inputs, counts: &Coun
     let triangles: usize = inputs.bodies.iter().map(|body| body.motion().triangles().len()).sum();
     let (layer, objects) = (memory::layer(inputs)?, triangles as f64 * TRIANGLE);
     let volumes = memory::of_volumes(scene, inputs, counts.grains)? as f64;
-    let volumes = VOLUMES * (volumes - FIXED).max(0.0);
+    let volumes = VOLUMES * (volumes - memory::FIXED).max(0.0);
     let base = if keeps_changes(scene) { LAYERS_OF_CHANGES } else { LAYERS } * layer + objects;
     let grains = 2.0 * layer + objects + counts.grains as f64 * GRAIN;
     let mist = if counts.cells > 0 { layer + objects + MIST + counts.cells as f64 * CELL } else { 0.0 };
