@@ -69,12 +69,6 @@ impl ShotFolder {
 
     /// The corners of the objects' extents in their files, as far as reports have them, or of their poses, over all frames.
     fn bounds_of_objects(&self) -> Result<Option<(DVec3, DVec3)>> {
-        if let Some(moving) = &self.moving {
-            let step = self.frames.len().div_ceil(MAX_POSES);
-            let frames: Vec<i32> =
-                self.frames.iter().step_by(step).chain(self.frames.last()).copied().collect();
-            return moving.bounds(&frames);
-        }
         let mut all = None::<(DVec3, DVec3)>;
         for frame in &self.frames {
             let contents = self.objects.contents(*frame, STAGES[OBJECTS].0)?.unwrap_or_default();
@@ -84,7 +78,16 @@ impl ShotFolder {
                 }
             }
         }
-        Ok(all)
+        if all.is_some() || self.files[0].is_empty() {
+            return Ok(all);
+        }
+        let step = self.frames.len().div_ceil(MAX_POSES);
+        let frames: Vec<i32> = self.frames.iter().step_by(step).chain(self.frames.last()).copied().collect();
+        if self.files[OBJECTS].is_empty() {
+            return self.moving.as_ref().map_or(Ok(None), |moving| moving.bounds(&frames));
+        }
+        // No report has the extents of .ply files.
+        moving_objects(&self.folder).map_or(Ok(None), |moving| moving.bounds(&frames))
     }
 
     /// The surface of the snow after a frame.
@@ -169,7 +172,7 @@ impl Folder for ShotFolder {
 fn moving_objects(folder: &Path) -> Option<MovingObjects> {
     let scene = Scene::read(&folder.join("scene.toml"));
     let moving = scene.and_then(|scene| MovingObjects::read(&scene));
-    moving.inspect_err(|error| log::warn!("{error}: the objects are not drawn")).ok()
+    moving.inspect_err(|error| log::warn!("{error}: the poses of objects are not known")).ok()
 }
 
 /// The corners of an extent in a report (m).
