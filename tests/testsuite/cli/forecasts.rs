@@ -99,6 +99,41 @@ fn snow(folder: &Path) {
 }
 
 #[test]
+fn memory_of_snow_is_about_what_check_says() {
+    let folder = &Folder::empty();
+    snow(folder);
+    for settings in [
+        "--set snow.cell=0.005 --set grains.radius=0.0025",
+        "--set grains.radius=0.003",
+        "--set mist.cell=0.012",
+    ] {
+        let said = report(folder, settings);
+        works(folder, &format!("snow shot.toml -o out -q --report run.json {settings}"));
+        let run: Value = serde_json::from_slice(&fs::read(folder.join("run.json")).unwrap()).unwrap();
+        let (peak, forecast) = (number(&run, "peak_memory_bytes"), number(&said, "memory_forecast_bytes"));
+        assert!(forecast < 2.0 * peak && peak < 2.0 * forecast, "{settings}: {peak} of {forecast}");
+        // More than the bytes of any run: this is not only they.
+        assert!(forecast > 1.3 * 64e6, "{settings}: {forecast}");
+        fs::remove_dir_all(folder.join("out")).unwrap();
+    }
+}
+
+#[test]
+fn grains_of_a_layer_without_known_heights_are_known_with_the_base() {
+    let folder = &Folder::empty();
+    snow(folder);
+    works(folder, "snow shot.toml -o made -q --stage base --frames 1");
+    let scene = fs::read_to_string(folder.join("shot.toml")).unwrap();
+    let scene = scene.replace("depth = 0.2\n", "top = \"made/base/base.0001.vdb\"\n");
+    let scene = scene.replace("area = [-0.5, -0.5, 0.5, 1.0]\n", "");
+    fs::write(folder.join("grid.toml"), scene).unwrap();
+    let said = works(folder, "check grid.toml");
+    assert!(said.contains("how many is known when the base exists"), "{said}");
+    works(folder, "snow grid.toml -o out -q --stage base");
+    assert!(works(folder, "check grid.toml -o out").contains("grains at once"));
+}
+
+#[test]
 fn before_mist_is_made_the_boxes_of_objects_are_filled_with_it() {
     let folder = &Folder::empty();
     snow(folder);
