@@ -79,7 +79,7 @@
 //! let pipeline = snow::pipeline(&scene, &inputs);
 //! let ctx = Context::new(Pool::all_cores()?);
 //! let run = Run::prepare(&ctx, &pipeline, &folder.join("cache"), &[], &scene.shot().frames.into(), None)?;
-//! run.make(&ctx, |stage, frame, report| log::info!("{stage} {frame}: {:?}", report.results))?;
+//! run.make(&ctx, |done| log::info!("{} {}: {:?}", done.stage, done.frame, done.report.results))?;
 //! assert!(folder.join("cache/base/base.0003.vdb").exists());
 //! # Ok(())
 //! # }

@@ -128,7 +128,7 @@ fn run(folder: &Path, out: &str, asked: &Asked<'_>) -> Result<Vec<(&'static str,
     let frames: FrameChoice = asked.frames.parse().unwrap();
     let made = std::sync::Mutex::new(Vec::new());
     let run = Run::prepare(&ctx, &pipeline, &folder.join(out), &stages, &frames, asked.from)?;
-    run.make(&ctx, |stage, frame, _| made.lock().unwrap().push((stage, frame)))?;
+    run.make(&ctx, |done| made.lock().unwrap().push((done.stage, done.frame)))?;
     Ok(made.into_inner().unwrap())
 }
 

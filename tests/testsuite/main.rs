@@ -79,6 +79,7 @@ mod render {
 }
 mod scene {
     mod clients;
+    mod costs;
     mod demo_jelly;
     mod demo_walk;
     mod farm;

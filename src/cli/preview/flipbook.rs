@@ -15,6 +15,7 @@ use crate::cli::shot::remaining::Remaining;
 use frazil::io::files::atomic;
 use frazil::io::files::sequence::Pattern;
 use frazil::render::{Gif, Palette, delays};
+use frazil::scene::run::{FrameCosts, Pace, ToMake};
 use frazil::{Context, Error, Result};
 
 /// Maximum number of frames made at once: each holds its snow as triangles, and a memory limit applies to each of them.
@@ -164,13 +165,18 @@ impl<'a> Flipbook<'a> {
         };
         let make =
             |_, parts: Result<_>| Ok(parts.and_then(|parts| finish(ctx, view, &look.build(ctx, parts)?)));
-        let pictures = Remaining::of(&[("picture", frames.len())], Instant::now());
+        let mut last = Instant::now();
+        let pictures =
+            ToMake { stage: "picture", frames: frames.iter().map(|frame| *frame..=*frame).collect() };
+        let pictures = Remaining::of(&[pictures], &FrameCosts::default(), last);
         let format = ProgressFormat::Text.unless(session.is_quiet());
         let mut progress = FrameProgress::new(ctx, pictures, 0, format);
         let at_once = ctx.pool().threads().min(MAX_AT_ONCE);
         in_order(frames.len(), at_once, read, make, |index, made| {
             if take(index, made)?.is_some() {
-                progress.finished("picture", frames[index]);
+                let begun = std::mem::replace(&mut last, Instant::now());
+                let pace = Pace { took: last - begun, ..Pace::default() };
+                progress.finished("picture", frames[index], pace);
             }
             Ok(())
         })

@@ -13,7 +13,7 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use frazil::Error;
-use frazil::scene::run::{Pipeline, Report, Run};
+use frazil::scene::run::{FrameCosts, Pipeline, Report, Run, ToMake};
 use frazil::scene::{FrameChoice, Override, Scene};
 
 use super::output;
@@ -82,13 +82,15 @@ impl ShotArgs {
         Ok(frames)
     }
 
-    /// Makes the frames of a pipeline; `on_report` is called with the report of each, by one thread at a time.
+    /// Makes the frames of a pipeline. `costs` gives what they are expected to take; `on_report` is called with the report of each, by one
+    /// thread at a time.
     pub fn make(
         &self,
         session: &Session,
         pipeline: &Pipeline<'_>,
         stages: &[String],
         frames: &FrameChoice,
+        costs: impl FnOnce(&[ToMake]) -> frazil::Result<FrameCosts>,
         on_report: impl FnMut(&Report) + Send,
     ) -> Result<(), Failure> {
         if self.finish && !self.output.join("state").is_dir() {
@@ -97,31 +99,28 @@ impl ShotArgs {
         }
         let run = self.prepare(session, pipeline, stages, frames)?;
         output::check_folder(&self.output).or_refuse()?;
-        let existing = run.existing();
-        let remaining = Remaining::of(&run.to_make(), Instant::now());
-        let to_make = remaining.total();
-        session.record("frames", to_make.into());
+        let (existing, to_make) = (run.existing(), run.to_make());
+        let count: usize = to_make.iter().map(|of_stage| of_stage.frames.len()).sum();
+        session.record("frames", count.into());
         session.record("frames_there", existing.into());
         if self.prepare {
             return Ok(());
         }
-        if self.finish && to_make > 0 {
-            let counts: Vec<String> = run
-                .to_make()
-                .iter()
-                .filter(|(_, count)| *count > 0)
-                .map(|(stage, count)| format!("{count} of stage {stage}"))
-                .collect();
+        if self.finish && count > 0 {
+            let of = |to_make: &ToMake| format!("{} of stage {}", to_make.frames.len(), to_make.stage);
+            let counts: Vec<String> = to_make.iter().map(of).collect();
             let what = format!("{}: frames are missing: {}", self.output.display(), counts.join(", "));
             return Err(Failure::failed(what));
         }
         let format = self.progress.unless(session.is_quiet());
+        let costs = format.map(|_| costs(&to_make)).transpose().or_fail()?.unwrap_or_default();
+        let remaining = Remaining::of(&to_make, &costs, Instant::now());
         let display = FrameProgress::new(&session.ctx, remaining, existing, format);
         let display = Mutex::new((display, on_report));
-        run.make(&session.ctx, |stage, frame, report| {
+        run.make(&session.ctx, |frame| {
             let mut display = display.lock().expect("no panic holds this lock");
-            (display.1)(report);
-            display.0.finished(stage, frame);
+            (display.1)(frame.report);
+            display.0.finished(frame.stage, frame.frame, frame.pace);
         })
         .or_fail()
     }

@@ -1,27 +1,53 @@
 //! Progress of a shot on stderr: a bar on a terminal, otherwise one line per frame, as text or as JSON.
 
-use frazil::{Context, context::Progress};
+use frazil::Context;
+use frazil::scene::run::Pace;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::json;
 use std::io::{IsTerminal, Write};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use super::remaining::Remaining;
 
-/// Length of one frame on the bar.
-const FRAME_LENGTH: u64 = 1000;
+/// Length of the bar: what a whole run takes.
+const LENGTH: u64 = 1000;
 
-/// Shows which frame was finished and the expected end; on a terminal also the progress within the running frame.
+/// Shows which frame was finished and the expected end; on a terminal also a bar that moves within frames.
 pub struct FrameProgress<'a> {
     ctx: &'a Context,
     bar: Option<ProgressBar>,
     /// How lines are printed, if they are.
     lines: Option<ProgressFormat>,
     remaining: Remaining,
-    done: Arc<AtomicUsize>,
+    /// Number of finished frames.
+    done: usize,
+    clock: Arc<RunClock>,
+}
+
+/// The part of its time that a run has taken.
+struct RunClock {
     start: Instant,
+    /// The time that it is expected to take, once that is known.
+    expected: Mutex<Option<Duration>>,
+}
+
+impl RunClock {
+    fn start() -> Self {
+        Self { start: Instant::now(), expected: Mutex::new(None) }
+    }
+
+    /// So much time is left.
+    fn expect(&self, left: Duration) {
+        *self.expected.lock().expect("no panic holds this lock") = Some(self.start.elapsed() + left);
+    }
+
+    /// From 0 to 1; 0 while nothing is known.
+    fn fraction(&self) -> f64 {
+        let expected = *self.expected.lock().expect("no panic holds this lock");
+        let spent = self.start.elapsed().as_secs_f64();
+        expected.map_or(0.0, |expected| (spent / expected.as_secs_f64().max(1e-9)).min(1.0))
+    }
 }
 
 /// How progress is shown.
@@ -54,37 +80,36 @@ impl<'a> FrameProgress<'a> {
             let _ = writeln!(std::io::stderr(), "{existing} frames exist, {total} are to be made");
         }
         let has_bar = std::io::stderr().is_terminal() && format == Some(ProgressFormat::Text);
-        let done = Arc::new(AtomicUsize::new(0));
+        let clock = Arc::new(RunClock::start());
         let bar = has_bar.then(|| {
-            let length = total as u64 * FRAME_LENGTH;
-            let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
+            let bar = ProgressBar::with_draw_target(Some(LENGTH), ProgressDrawTarget::stderr());
             let style = ProgressStyle::with_template("{prefix} [{bar:40}] {percent}% {msg}");
             bar.set_style(style.expect("a fixed template").progress_chars("=> "));
             bar.enable_steady_tick(Duration::from_millis(250));
-            ctx.set_poll(Some(bar_poll(bar.clone(), done.clone())));
+            ctx.set_poll(Some(bar_poll(bar.clone(), clock.clone())));
             bar
         });
-        Self { ctx, bar, lines: format.filter(|_| !has_bar), remaining, done, start: Instant::now() }
+        Self { ctx, bar, lines: format.filter(|_| !has_bar), remaining, done: 0, clock }
     }
 
-    /// A frame of a stage is written.
-    pub fn finished(&mut self, stage: &str, frame: i32) {
-        let (done, total) = (self.done.fetch_add(1, Ordering::Relaxed) + 1, self.remaining.total());
-        self.remaining.finished(stage, Instant::now());
+    /// The files of a frame are written.
+    pub fn finished(&mut self, stage: &str, frame: i32, pace: Pace) {
+        self.remaining.finished(stage, pace, Instant::now());
+        self.done += 1;
         let left = self.remaining.time();
+        self.clock.expect(left);
         if let Some(bar) = &self.bar {
-            bar.set_prefix(format!("frame {frame} stage {stage} {done}/{total}"));
+            bar.set_prefix(format!("frame {frame} stage {stage} {}/{}", self.done, self.remaining.total()));
             bar.set_message(format!("eta {}", clock(left)));
-            advance(bar, done, None);
+            advance(bar, &self.clock);
         }
+        let fraction = self.clock.fraction();
         let line = match self.lines {
             Some(ProgressFormat::Text) => {
-                let percent = 100 * done / total.max(1);
-                format!("frame {frame} stage {stage} {percent}% eta {}", clock(left))
+                format!("frame {frame} stage {stage} {:.0}% eta {}", (100.0 * fraction).floor(), clock(left))
             }
             Some(ProgressFormat::Json) => {
-                let [spent, left] = [self.start.elapsed(), left].map(|time| time.as_secs_f64());
-                let fraction = if left > 0.0 { spent / (spent + left) } else { 1.0 };
+                let left = left.as_secs_f64();
                 json!({ "stage": stage, "frame": frame, "fraction": fraction, "seconds_left": left })
                     .to_string()
             }
@@ -103,18 +128,17 @@ impl Drop for FrameProgress<'_> {
     }
 }
 
-/// A poll that moves the bar within the running frame.
-fn bar_poll(bar: ProgressBar, done: Arc<AtomicUsize>) -> frazil::context::Poll {
-    Box::new(move |progress: &Progress| {
-        advance(&bar, done.load(Ordering::Relaxed), progress.fraction);
+/// A poll that moves the bar within frames.
+fn bar_poll(bar: ProgressBar, clock: Arc<RunClock>) -> frazil::context::Poll {
+    Box::new(move |_| {
+        advance(&bar, &clock);
         false
     })
 }
 
-/// Moves the bar to a frame count and a fraction of the next frame; never backwards, though frames are computed ahead of the
-/// files.
-fn advance(bar: &ProgressBar, done: usize, fraction: Option<f32>) {
-    let position = done as u64 * FRAME_LENGTH + (fraction.unwrap_or(0.0) * FRAME_LENGTH as f32) as u64;
+/// Moves the bar; never backwards, though a forecast may grow.
+fn advance(bar: &ProgressBar, clock: &RunClock) {
+    let position = (clock.fraction() * LENGTH as f64) as u64;
     bar.set_position(position.max(bar.position()));
 }
 
@@ -138,19 +162,23 @@ mod tests {
 
     #[test]
     fn the_bar_moves_within_a_frame_and_never_backwards() {
-        let (bar, done) = (ProgressBar::hidden(), Arc::new(AtomicUsize::new(1)));
+        let (bar, clock) = (ProgressBar::hidden(), Arc::new(RunClock::start()));
         let ctx = Context::new(Pool::new(1).expect("one thread"));
-        ctx.set_poll(Some(bar_poll(bar.clone(), done)));
-        let half = || {
-            ctx.phase("first", || Ok(()))?;
-            assert_eq!(bar.position(), FRAME_LENGTH);
-            ctx.phase("second", || Ok(()))
+        ctx.set_poll(Some(bar_poll(bar.clone(), clock.clone())));
+        let phase = |name| {
+            ctx.phase(name, || Ok(())).expect("no cancel");
+            bar.position()
         };
-        ctx.step(2, half).expect("no cancel");
-        assert_eq!(bar.position(), FRAME_LENGTH + FRAME_LENGTH / 2);
-        advance(&bar, 1, None);
-        assert_eq!(bar.position(), FRAME_LENGTH + FRAME_LENGTH / 2);
-        advance(&bar, 2, None);
-        assert_eq!(bar.position(), 2 * FRAME_LENGTH);
+        ctx.step(3, || {
+            assert_eq!(phase("nothing is known"), 0);
+            clock.expect(Duration::ZERO);
+            assert_eq!(phase("no time is left"), LENGTH);
+            clock.expect(Duration::from_secs(1000));
+            assert_eq!(phase("more time is left"), LENGTH);
+            Ok(())
+        })
+        .expect("no cancel");
+        clock.expect(Duration::from_secs(1000));
+        assert!(clock.fraction() < 0.1);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use frazil::scene::run::Report;
+use frazil::scene::run::{FrameCosts, Report};
 use frazil::scene::{Scene, shallow};
 use serde_json::{Map, Value, json};
 
@@ -39,10 +39,17 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let inputs = shallow::Inputs::load(&session.ctx, &scene).or_refuse()?;
     let pipeline = shallow::pipeline(&session.ctx, &scene, &inputs).or_refuse()?;
     let (mut times, mut last) = (Times::default(), None);
-    args.shot.make(session, &pipeline, &[], &frames, |report| {
-        times.add(report);
-        last = Some(report.results.clone());
-    })?;
+    args.shot.make(
+        session,
+        &pipeline,
+        &[],
+        &frames,
+        |_| Ok(FrameCosts::default()),
+        |report| {
+            times.add(report);
+            last = Some(report.results.clone());
+        },
+    )?;
     for (name, value) in last.unwrap_or_default().into_iter().filter(|(name, _)| name.ends_with("_ml")) {
         session.record(&name, value);
     }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use frazil::scene::run::ToMake;
 use frazil::scene::{Inputs, Scene, check_memory, snow};
 
 use super::ShotArgs;
@@ -51,7 +52,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     check_memory(&scene, &inputs, session.max_memory()).or_refuse()?;
     let pipeline = snow::pipeline(&scene, &inputs);
     let mut removed = 0.0;
-    args.shot.make(session, &pipeline, &args.stage, &frames, |report| {
+    let costs = |to_make: &[ToMake]| snow::costs(&session.ctx, &scene, &inputs, &args.shot.output, to_make);
+    args.shot.make(session, &pipeline, &args.stage, &frames, costs, |report| {
         let volume = report.results.get("removed_m3").and_then(|value| value.as_f64());
         removed += volume.unwrap_or(0.0);
     })?;

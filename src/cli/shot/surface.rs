@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use frazil::io::files::sequence::Pattern;
+use frazil::scene::run::ToMake;
 use frazil::scene::{Frames, Scene, surface};
 
 use super::ShotArgs;
@@ -50,7 +51,8 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let inputs = surface::Inputs::load(&session.ctx, &scene).or_refuse()?;
     let pipeline = surface::pipeline(&scene, &inputs).or_refuse()?;
     let mut flagged = 0;
-    args.shot.make(session, &pipeline, &[], &frames, |report| {
+    let costs = |to_make: &[ToMake]| Ok(surface::costs(&scene, scene.surface()?, &inputs, to_make));
+    args.shot.make(session, &pipeline, &[], &frames, costs, |report| {
         let count = report.results.get("flagged").and_then(|value| value.as_u64());
         flagged = flagged.max(count.unwrap_or(0));
     })?;

@@ -8,9 +8,11 @@
 
 mod cache;
 mod chain;
+mod costs;
 mod done_frames;
 mod going_back;
 mod own_files;
+mod pace;
 mod pass;
 mod pipeline;
 mod runner;
@@ -19,10 +21,12 @@ mod stage;
 mod usd;
 pub mod verify;
 
+pub use costs::FrameCosts;
 pub use done_frames::DoneFrames;
-pub use pass::AnyStage;
+pub use pace::Pace;
+pub use pass::{AnyStage, FrameDone};
 pub use pipeline::Pipeline;
-pub use runner::Run;
+pub use runner::{Run, ToMake};
 #[cfg(test)]
 pub(in crate::scene) use settings::changed;
 pub use settings::{CONTENT, Settings};

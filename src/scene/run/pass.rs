@@ -2,7 +2,7 @@
 
 use std::panic::resume_unwind;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
 
 use serde_json::{Map, Value, json};
@@ -10,6 +10,7 @@ use serde_json::{Map, Value, json};
 use super::cache::Cache;
 use super::chain::FrameHashes;
 use super::done_frames::{CONTENTS, DoneFrames, Resumable};
+use super::pace::{Clock, Pace};
 use super::stage::{FrameFiles, Report, Stage, StepTarget, Stepped, Stepping};
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
@@ -24,8 +25,20 @@ const MAX_WAITING: usize = 2;
 /// Number of exact states that are kept, unless a stage requires those of all frames.
 const STATES_KEPT: i32 = 2;
 
-/// Called for each frame whose files are written, with the stage, the frame and its report; from several threads.
-pub type OnFrameDone<'a> = &'a (dyn Fn(&'static str, i32, &Report) + Sync);
+/// Called for each frame whose files are written; from several threads.
+pub type OnFrameDone<'a> = &'a (dyn Fn(&FrameDone<'_>) + Sync);
+
+/// A frame whose files are written.
+pub struct FrameDone<'a> {
+    /// The stage.
+    pub stage: &'static str,
+    /// The frame.
+    pub frame: i32,
+    /// Its report.
+    pub report: &'a Report,
+    /// How its steps went.
+    pub pace: Pace,
+}
 
 /// Shared by the passes of a run.
 #[derive(Clone, Copy)]
@@ -107,11 +120,19 @@ enum Job<S: Stepping> {
     Step(Box<Frame<S::Step>>),
 }
 
-/// A step, with the hashes of its frame if the files are wanted.
+/// A step.
 struct Frame<T> {
     frame: i32,
-    hashes: Option<FrameHashes>,
+    /// If the files are wanted.
+    wanted: Option<Wanted>,
     stepped: Stepped<T>,
+}
+
+/// What is known of a frame whose files are wanted.
+struct Wanted {
+    hashes: FrameHashes,
+    /// When it was computed.
+    pace: Pace,
 }
 
 impl<'a, S: Stepping> StagePass<'a, S> {
@@ -133,11 +154,17 @@ impl<'a, S: Stepping> StagePass<'a, S> {
     }
 
     /// Steps to every wanted frame; `send` passes a job to the writing thread and returns whether that still receives jobs.
-    fn step_all(mut self, work: &mut Work<'_>, send: impl Fn(Job<S>) -> bool) -> Result<()> {
+    fn step_all(
+        mut self,
+        work: &mut Work<'_>,
+        computed: &AtomicUsize,
+        send: impl Fn(Job<S>) -> bool,
+    ) -> Result<()> {
         let Work { shared, upstream, todo, .. } = *work;
         let (stage, ctx, cache) = (self.stage, shared.ctx, &mut *work.cache);
         // Whether the writer's state is that from which the next step starts.
         let mut is_writer_current = false;
+        let mut clock = Clock::default();
         for &wanted in todo {
             let is_nearer = || cache.stored.latest_state(self.frame + 1..=wanted - 1).is_some();
             if self.frame < wanted - 1 && (!stage.has_memory() || is_nearer()) {
@@ -149,15 +176,21 @@ impl<'a, S: Stepping> StagePass<'a, S> {
                     return Ok(());
                 }
                 let frame = self.frame + 1;
-                if !is_writer_current && !send(Job::Start(stage.writer(ctx, &self.state)?)) {
-                    return Ok(());
+                if !is_writer_current {
+                    let start = Job::Start(stage.writer(ctx, &self.state)?);
+                    if !clock.wait(|| send(start)) {
+                        return Ok(());
+                    }
                 }
                 is_writer_current = true;
                 let hashes = if frame == wanted { Some(cache.hashes(stage, frame, upstream)?) } else { None };
                 let made_from = hashes.as_ref().map(|hashes| &hashes.inputs[..]);
                 let stepped = stage.step(ctx, &mut self.state, &StepTarget { frame, made_from, upstream })?;
                 self.frame = frame;
-                if !send(Job::Step(Box::new(Frame { frame, hashes, stepped }))) {
+                let wanted = hashes.map(|hashes| Wanted { hashes, pace: clock.lap() });
+                computed.fetch_add(usize::from(wanted.is_some()), Ordering::Relaxed);
+                let step = Job::Step(Box::new(Frame { frame, wanted, stepped }));
+                if !clock.wait(|| send(step)) {
                     return Ok(());
                 }
             }
@@ -170,11 +203,18 @@ impl<S: Stepping> Pass for StagePass<'_, S> {
     fn make(self: Box<Self>, mut work: Work<'_>) -> Result<()> {
         let folder = work.cache.stored.folder().to_path_buf();
         let Work { shared, states_every, .. } = work;
-        let writer = FrameWriter { stage: self.stage, folder: &folder, first: shared.first, states_every };
+        let computed = AtomicUsize::new(0);
+        let writer = FrameWriter {
+            stage: self.stage,
+            folder: &folder,
+            first: shared.first,
+            states_every,
+            computed: &computed,
+        };
         let (jobs, waiting) = sync_channel(MAX_WAITING);
         let (made, finished) = std::thread::scope(|scope| {
             let writing = scope.spawn(|| writer.write_all(waiting, shared.on_done));
-            let made = self.step_all(&mut work, |job| jobs.send(job).is_ok());
+            let made = self.step_all(&mut work, &computed, |job| jobs.send(job).is_ok());
             drop(jobs);
             (made, writing.join())
         });
@@ -192,6 +232,8 @@ struct FrameWriter<'a, S> {
     first: i32,
     /// As in [`Work`].
     states_every: i32,
+    /// Number of wanted frames that were computed so far.
+    computed: &'a AtomicUsize,
 }
 
 impl<S: Stepping> FrameWriter<'_, S> {
@@ -201,6 +243,7 @@ impl<S: Stepping> FrameWriter<'_, S> {
         let mut manifests = Vec::new();
         let mut writer = None;
         let (mut first_error, mut failures_in_a_row): (Option<Error>, usize) = (None, 0);
+        let mut received = 0;
         let may_skip = self.stage.writes_frames_independently() && self.stage.needs_every_frame().is_none();
         for job in waiting {
             let frame = match job {
@@ -214,7 +257,8 @@ impl<S: Stepping> FrameWriter<'_, S> {
                 return (manifests, Err(Error::Internal("a step came before its start".into())));
             };
             let number = frame.frame;
-            match self.write(writer, *frame, on_done) {
+            received += usize::from(frame.wanted.is_some());
+            match self.write(writer, *frame, received, on_done) {
                 Ok(manifest) => {
                     manifests.extend(manifest);
                     failures_in_a_row = 0;
@@ -230,15 +274,16 @@ impl<S: Stepping> FrameWriter<'_, S> {
         (manifests, first_error.map_or(Ok(()), Err))
     }
 
-    /// Writes a frame, or only updates the writer if its files are not wanted.
+    /// Writes a frame, the wanted one of number `received`, or only updates the writer if its files are not wanted.
     fn write(
         &self,
         writer: &mut S::Writer,
         frame: Frame<S::Step>,
+        received: usize,
         on_done: OnFrameDone<'_>,
     ) -> Result<Option<Manifest>> {
-        let Frame { frame, hashes, stepped: Stepped { step, report } } = frame;
-        let Some(hashes) = hashes else {
+        let Frame { frame, wanted, stepped: Stepped { step, report } } = frame;
+        let Some(Wanted { hashes, pace }) = wanted else {
             self.stage.write(writer, step, None)?;
             return Ok(None);
         };
@@ -252,7 +297,8 @@ impl<S: Stepping> FrameWriter<'_, S> {
         if keeps == Keeps::State && self.states_every != 1 {
             self.remove_states_before(frame);
         }
-        on_done(self.stage.name(), frame, &report);
+        let pace = Pace { ahead: self.computed.load(Ordering::Relaxed) - received, ..pace };
+        on_done(&FrameDone { stage: self.stage.name(), frame, report: &report, pace });
         Ok(Some(manifest))
     }
 

@@ -1,6 +1,7 @@
 //! Runs the stages of a scene into a folder, resuming where an earlier run stopped.
 
 use std::fs::File;
+use std::ops::RangeInclusive;
 use std::panic::resume_unwind;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,9 +11,9 @@ use super::cache::{Cache, Request, check_request};
 use super::done_frames::DoneFrames;
 use super::going_back::resumable_from;
 use super::own_files::OwnFiles;
-use super::pass::{AnyStage, Pass, Shared, Work};
+use super::pass::{AnyStage, FrameDone, OnFrameDone, Pass, Shared, Work};
 use super::pipeline::Pipeline;
-use super::stage::{Report, Stage};
+use super::stage::Stage;
 use super::{chain, own_files, usd};
 use crate::context::{Context, release_freed_memory};
 use crate::error::{Error, Result};
@@ -29,6 +30,15 @@ pub struct Run<'a> {
     is_chunk: bool,
     /// Held until the run is dropped.
     _lock: File,
+}
+
+/// The frames of a stage that a run will make.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ToMake {
+    /// The stage.
+    pub stage: &'static str,
+    /// The frames that are computed for each frame to be written, which is the last of them.
+    pub frames: Vec<RangeInclusive<i32>>,
 }
 
 /// Who may write into a folder beside a run.
@@ -181,8 +191,7 @@ impl<'a> Run<'a> {
         Ok(run)
     }
 
-    /// Fails if an upstream frame that a step reads neither exists nor will be made. The steps to a frame start from the latest state that is
-    /// kept, and pass through all frames between.
+    /// Fails if an upstream frame that a step reads neither exists nor will be made.
     fn refuse_missing(
         &self,
         stage: &dyn Stage,
@@ -196,14 +205,8 @@ impl<'a> Run<'a> {
             let is_there = |frame: &i32| {
                 stored.is_done(*frame) || made.is_some_and(|made| made.binary_search(frame).is_ok())
             };
-            let mut at = first - 1;
-            for &wanted in todo {
-                let from = own.latest_state(at + 1..=wanted - 1).unwrap_or(at);
-                let begin = if stage.has_memory() { from + 1 } else { wanted };
-                if let Some(frame) = (begin..=wanted).find(|frame| !is_there(frame)) {
-                    return Err(chain::missing(stage, frame, name, stored.folder()));
-                }
-                at = wanted;
+            if let Some(frame) = computed(stage, own, todo, first).flatten().find(|frame| !is_there(frame)) {
+                return Err(chain::missing(stage, frame, name, stored.folder()));
             }
         }
         Ok(())
@@ -260,9 +263,15 @@ impl<'a> Run<'a> {
         busy.any(|other| run.stage.upstream().contains(&other.stage.name()))
     }
 
-    /// The stages with their numbers of frames to be made.
-    pub fn to_make(&self) -> Vec<(&'static str, usize)> {
-        self.stages.iter().map(|run| (run.stage.name(), run.todo.len())).collect()
+    /// The stages that have frames to make, with these frames.
+    pub fn to_make(&self) -> Vec<ToMake> {
+        let first = self.pipeline.scene.shot.frames.first;
+        let of = |run: &StageRun<'_>| {
+            let stored = &run.cache.as_ref()?.stored;
+            let frames: Vec<_> = computed(run.stage, stored, &run.todo, first).collect();
+            (!frames.is_empty()).then(|| ToMake { stage: run.stage.name(), frames })
+        };
+        self.stages.iter().filter_map(of).collect()
     }
 
     /// Number of wanted frames that exist, over all stages.
@@ -277,7 +286,7 @@ impl<'a> Run<'a> {
     ///
     /// # Errors
     /// The error of the first step or file that fails; complete frames remain, from which another run resumes.
-    pub fn make(mut self, ctx: &Context, on_done: impl Fn(&'static str, i32, &Report) + Sync) -> Result<()> {
+    pub fn make(mut self, ctx: &Context, on_done: impl Fn(&FrameDone<'_>) + Sync) -> Result<()> {
         let mut first_error = None;
         while let Some(ready) = self.ready() {
             let results = self.make_stages(ctx, &ready, &on_done)?;
@@ -334,7 +343,7 @@ impl<'a> Run<'a> {
         &mut self,
         ctx: &Context,
         ready: &[usize],
-        on_done: &(dyn Fn(&'static str, i32, &Report) + Sync),
+        on_done: OnFrameDone<'_>,
     ) -> Result<Vec<Result<()>>> {
         let stop = AtomicBool::new(false);
         let shared = Shared { ctx, first: self.pipeline.scene.shot.frames.first, stop: &stop, on_done };
@@ -391,6 +400,21 @@ impl StageRun<'_> {
         };
         start.make(Work { shared, cache, upstream, todo: &todo, states_every })
     }
+}
+
+/// The frames that are computed for each wanted one: the steps start from the latest state that is kept, and pass through all frames between.
+fn computed(
+    stage: &dyn Stage,
+    own: &DoneFrames,
+    todo: &[i32],
+    first: i32,
+) -> impl Iterator<Item = RangeInclusive<i32>> {
+    let mut at = first - 1;
+    todo.iter().map(move |&wanted| {
+        let before = std::mem::replace(&mut at, wanted);
+        let from = || own.latest_state(before + 1..=wanted - 1).unwrap_or(before);
+        (if stage.has_memory() { from() + 1 } else { wanted })..=wanted
+    })
 }
 
 /// The frame from which the chosen stages of a folder are made again.

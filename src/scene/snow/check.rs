@@ -6,9 +6,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::estimate::grains::Removed;
 use super::estimate::peak::{Counts, peak};
-use super::estimate::removed::removed;
+use super::estimate::removed::removed_snow;
 use super::estimate::{disk, memory};
 use super::inspect::object_path::ObjectPath;
 use super::inspect::relief::Relief;
@@ -101,23 +100,4 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs, folder: Option<&Path
         warnings,
         settings: scene.values.by_path(),
     })
-}
-
-/// The snow that is removed in each frame: as far as a base in `folder` tells, then by the poses of objects, if heights of the snow are known.
-fn removed_snow(
-    ctx: &Context,
-    scene: &Scene,
-    inputs: &Inputs,
-    folder: Option<&Path>,
-    paths: &[ObjectPath],
-    relief: Option<&Relief>,
-) -> Result<Removed> {
-    let by_base = match folder {
-        Some(folder) => Removed::by_base(scene, &DoneFrames::read(folder, "base")?, scene.shot.frames.last)?,
-        None => Removed::default(),
-    };
-    match relief.filter(|_| by_base.missing(scene) > 0) {
-        Some(relief) => Ok(by_base.and_estimated(&removed(ctx, scene, relief, paths, inputs.snow.cell)?)),
-        None => Ok(by_base),
-    }
 }

@@ -31,6 +31,7 @@ pub(super) use keys::snow::KEYS;
 pub(super) use keys::volumes::check_volumes;
 #[cfg(feature = "vdb")]
 pub use {
+    estimate::costs::costs,
     estimate::grains::Forecast,
     estimate::memory::{check as check_memory, estimate},
     estimate::mist::MistForecast,

@@ -19,6 +19,7 @@ pub(super) use keys::KEYS;
 #[cfg(feature = "vdb")]
 pub use {
     check::{Report, check},
+    estimate::costs::costs,
     inputs::Inputs,
     pipeline::pipeline,
 };

@@ -68,6 +68,11 @@ impl Removed {
         self
     }
 
+    /// The volume of each known frame (m3); none for the first one: snow cut out by the first poses was removed before the shot began.
+    fn after_first(&self) -> impl Iterator<Item = f64> {
+        self.volumes.iter().enumerate().map(|(at, volume)| if at == 0 { 0.0 } else { *volume })
+    }
+
     /// Number of frames of the shot that are not known.
     pub fn missing(&self, scene: &Scene) -> usize {
         scene.shot.frames.count() - self.volumes.len()
@@ -84,28 +89,16 @@ impl Forecast {
         inputs: &Inputs,
         removed: &Removed,
     ) -> Result<Option<Self>> {
-        let first = scene.shot.frames.first;
-        let mut volumes = removed.volumes.clone();
-        let Some(of_first) = volumes.first_mut() else { return Ok(None) };
-        // Snow cut out by the first poses was removed before the shot began.
-        *of_first = 0.0;
+        let Some(counts) = counts(scene, inputs, removed) else { return Ok(None) };
+        let (first, volumes) = (scene.shot.frames.first, removed.after_first());
         let params = params(scene, inputs.snow.cell);
-        let removers = scene.objects.iter().enumerate().filter(|(_, object)| object.role.removes());
-        let compression_of = |index| scene.values.element(OBJECT, index).find("compression");
-        let all: Vec<f64> =
-            removers.map(|(index, _)| compression_of(index).unwrap_or(params.compression)).collect();
-        let compression = all.iter().copied().reduce(f64::min).unwrap_or(params.compression);
-        let grain = std::f64::consts::PI / 6.0 * (2.0 * params.radius).powi(3);
-        let grains_of = |volume: f64| volume * (1.0 - compression) * PACKING / grain;
-        let mut born: Vec<f64> = volumes.iter().map(|volume| grains_of(*volume)).collect();
-        born[0] += inputs.initial_grains.as_ref().map_or(0.0, |initial| initial.positions.len() as f64);
-        let lifetime = params.lifetime.map(|lifetime| (lifetime * scene.shot.fps).ceil() as usize);
-        let counts = alive(&born, lifetime.unwrap_or(usize::MAX));
+        let all = compressions(scene, params.compression);
+        let compression = minimum(&all, params.compression);
         let grains = counts.iter().copied().fold(0.0, f64::max).round() as u64;
         Ok(Some(Self {
-            to_frame: first + (volumes.len() - 1) as i32,
+            to_frame: first + (counts.len() - 1) as i32,
             base_to_frame: removed.by_base.checked_sub(1).map(|after| first + after as i32),
-            removed_m3: volumes.iter().sum(),
+            removed_m3: volumes.sum(),
             compression,
             grains,
             at_most: all.iter().any(|other| *other != compression) || params.keep_box.is_some(),
@@ -152,6 +145,31 @@ impl Forecast {
     pub fn count(&self) -> String {
         format!("{} {} grains at once", if self.at_most { "at most about" } else { "about" }, self.grains)
     }
+}
+
+/// Count of grains after each frame whose removed snow is known; `None` if not even that of the first frame is.
+pub(in crate::scene::snow) fn counts(scene: &Scene, inputs: &Inputs, removed: &Removed) -> Option<Vec<f64>> {
+    let params = params(scene, inputs.snow.cell);
+    let compression = minimum(&compressions(scene, params.compression), params.compression);
+    let grain = std::f64::consts::PI / 6.0 * (2.0 * params.radius).powi(3);
+    let mut born: Vec<f64> =
+        removed.after_first().map(|volume| volume * (1.0 - compression) * PACKING / grain).collect();
+    *born.first_mut()? +=
+        inputs.initial_grains.as_ref().map_or(0.0, |initial| initial.positions.len() as f64);
+    let lifetime = params.lifetime.map(|lifetime| (lifetime * scene.shot.fps).ceil() as usize);
+    Some(alive(&born, lifetime.unwrap_or(usize::MAX)))
+}
+
+/// The compression of each object that removes snow.
+fn compressions(scene: &Scene, default: f64) -> Vec<f64> {
+    let removers = scene.objects.iter().enumerate().filter(|(_, object)| object.role.removes());
+    let of = |index| scene.values.element(OBJECT, index).find("compression");
+    removers.map(|(index, _)| of(index).unwrap_or(default)).collect()
+}
+
+/// The minimum of some numbers, or the default without any.
+fn minimum(of: &[f64], default: f64) -> f64 {
+    of.iter().copied().reduce(f64::min).unwrap_or(default)
 }
 
 /// The maximum number of grains of a scene.

@@ -74,8 +74,7 @@ pub(super) fn keeps_changes(scene: &Scene) -> bool {
 pub(in crate::scene::snow) fn of_volumes(scene: &Scene, inputs: &Inputs, grains: u64) -> Result<u64> {
     let volumes = scene.output.volumes;
     let needs = Needs::of(volumes, &scene.values);
-    let layer = layer(inputs)?;
-    let columns = layer / BYTES_PER_COLUMN;
+    let (layer, columns) = (layer(inputs)?, columns(inputs)?);
     let fine = if needs.grains { division(scene, inputs) as f64 } else { 1.0 };
     let base = f64::from(needs.base) * layer
         + f64::from(volumes.fog_base) * 2.0 * layer
@@ -109,6 +108,11 @@ pub(in crate::scene::snow) fn of_grains(inputs: &Inputs, grains: u64) -> Result<
 fn besides_layers(inputs: &Inputs) -> f64 {
     let triangles: usize = inputs.bodies.iter().map(|body| body.motion().triangles().len()).sum();
     triangles as f64 * BYTES_PER_TRIANGLE + FIXED
+}
+
+/// Count of columns of a layer.
+pub(super) fn columns(inputs: &Inputs) -> Result<f64> {
+    Ok(layer(inputs)? / BYTES_PER_COLUMN)
 }
 
 /// Bytes of a layer.

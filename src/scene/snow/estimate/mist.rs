@@ -74,7 +74,7 @@ impl MistForecast {
         let existing = stored.map(|stored| existing_cells(stored, params.cell, last)).transpose()?.flatten();
         let of_frames = match existing {
             Some((_, cells)) => vec![cells; scene.shot.frames.count()],
-            None => cells_in_boxes(ctx, scene, paths, &params)?,
+            None => cells_in_boxes(ctx, scene, paths, &params, scene.shot.frames.first)?,
         };
         // The maximum number of cells at one time, and the sum over all frames.
         let (max, total) = (of_frames.iter().copied().fold(0.0, f64::max), of_frames.iter().sum::<f64>());
@@ -149,9 +149,15 @@ fn existing_cells(stored: &DoneFrames, cell: f64, last: i32) -> Result<Option<(i
     Ok(Some((end, max * factor.powi(3))))
 }
 
-/// Count of cells at each frame, if mist fills the boxes of all objects that push grains near the snow, lasts until it has dissipated, and
-/// drifts with a uniform wind.
-fn cells_in_boxes(ctx: &Context, scene: &Scene, paths: &[ObjectPath], params: &Params) -> Result<Vec<f64>> {
+/// Count of cells at each frame, if mist fills the boxes of all objects that push grains near the snow from a frame on, lasts until it has
+/// dissipated, and drifts with a uniform wind.
+pub(in crate::scene::snow) fn cells_in_boxes(
+    ctx: &Context,
+    scene: &Scene,
+    paths: &[ObjectPath],
+    params: &Params,
+    from: i32,
+) -> Result<Vec<f64>> {
     let (frames, fps) = (scene.shot.frames, scene.shot.fps);
     let count = frames.count();
     let interval_length = count.div_ceil(MAX_INTERVALS).max(1);
@@ -172,7 +178,7 @@ fn cells_in_boxes(ctx: &Context, scene: &Scene, paths: &[ObjectPath], params: &P
             if let Some(top) = path.top_of_snow().filter(|_| gravity < 0.0) {
                 high.y = high.y.min(top - fastest * fastest / (2.0 * gravity));
             }
-            (low.y <= high.y).then_some((frame, [low, high]))
+            (frame >= from && low.y <= high.y).then_some((frame, [low, high]))
         };
         united(path.boxes_near_snow().filter_map(in_reach).map(interval_box))
     };

@@ -1,14 +1,19 @@
 //! Forecast of the snow that objects remove in each frame, before the base is made: the objects are posed, and each column of snow loses what
 //! lies between the lowest and the highest surface that has been there. Ragged edges and static objects are ignored.
 
+use std::path::Path;
+
 use nalgebra::Vector2;
 use rayon::prelude::*;
 
+use super::grains::Removed;
 use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::DVec3;
 use crate::motion::Poses;
 use crate::scene::Scene;
+use crate::scene::run::DoneFrames;
+use crate::scene::snow::Inputs;
 use crate::scene::snow::inspect::object_path::ObjectPath;
 use crate::scene::snow::inspect::relief::Relief;
 
@@ -25,11 +30,30 @@ type DVec2 = Vector2<f64>;
 /// The lowest and highest y (m) of a surface in a column.
 type Span = [f64; 2];
 
-/// Volume (m3) that all objects remove in each frame of the shot; in the first one, that of their first poses.
+/// The snow that is removed in each frame: as far as a base in `folder` tells, then by the poses of objects, if heights of the snow are known.
 ///
 /// # Errors
-/// A pose that cannot be computed; cancel.
-pub(in crate::scene::snow) fn removed(
+/// A damaged record of the base; a pose that cannot be computed; cancel.
+pub(in crate::scene::snow) fn removed_snow(
+    ctx: &Context,
+    scene: &Scene,
+    inputs: &Inputs,
+    folder: Option<&Path>,
+    paths: &[ObjectPath],
+    relief: Option<&Relief>,
+) -> Result<Removed> {
+    let by_base = match folder {
+        Some(folder) => Removed::by_base(scene, &DoneFrames::read(folder, "base")?, scene.shot.frames.last)?,
+        None => Removed::default(),
+    };
+    match relief.filter(|_| by_base.missing(scene) > 0) {
+        Some(relief) => Ok(by_base.and_estimated(&estimated(ctx, scene, relief, paths, inputs.snow.cell)?)),
+        None => Ok(by_base),
+    }
+}
+
+/// Volume (m3) that all objects remove in each frame of the shot; in the first one, that of their first poses.
+fn estimated(
     ctx: &Context,
     scene: &Scene,
     relief: &Relief,

@@ -453,7 +453,7 @@ impl Surface {
     }
 
     /// Whether coming frames affect a frame's files.
-    fn reads_ahead(&self) -> bool {
+    pub(in crate::scene::surface) fn reads_ahead(&self) -> bool {
         self.output.velocities || self.output.usd || self.eases()
     }
 
@@ -462,7 +462,7 @@ impl Surface {
     }
 
     /// The files between two frames of the shot.
-    fn files_between(&self, shot: Frames, from: i32, to: i32) -> Vec<PathBuf> {
+    pub(in crate::scene::surface) fn files_between(&self, shot: Frames, from: i32, to: i32) -> Vec<PathBuf> {
         self.files(self.time(shot, from), self.time(shot, to))
     }
 }
