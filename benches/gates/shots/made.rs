@@ -22,6 +22,8 @@ pub const SNOW: &[&str] =
     &["output.objects=[]", "output.mesh=[]", "output.grains=[\"vdb\"]", "output.mist_half=false"];
 const SURFACE: &[&str] = &["output.surface=[\"ply\"]"];
 const SHALLOW: &[&str] = &["output.liquid=[\"ply\"]", "output.terrain=[]"];
+/// A terrain was written only where the liquid stains it.
+const STAINING: &[&str] = &["output.liquid=[\"ply\"]", "output.terrain=[\"ply\"]"];
 
 /// The shots of the demo and of the examples: all systems, all stages, terrains with and without stains.
 pub const DEMO: [Shot; 7] = [
@@ -31,7 +33,7 @@ pub const DEMO: [Shot; 7] = [
     Shot { name: "liquid", system: "surface", frames: None, former: SURFACE },
     Shot { name: "drip", system: "surface", frames: None, former: SURFACE },
     Shot { name: "spill_layers", system: "shallow", frames: Some("1-361x12"), former: SHALLOW },
-    Shot { name: "spill_bone", system: "shallow", frames: Some("1-481x60"), former: SHALLOW },
+    Shot { name: "spill_bone", system: "shallow", frames: Some("1-481x60"), former: STAINING },
 ];
 
 /// A folder with the scenes of the demo, made in another.
