@@ -12,7 +12,7 @@ BUILD := cargo build --release -p frazil -p make_scenes --lib --bin frazil --bin
 # so this one is copied to another folder; `$(BUILD)` puts the whole one back.
 CORE := cargo build --release -p frazil --no-default-features --lib && mkdir -p target/core && cp target/release/libfrazil.a target/core/
 
-.PHONY: setup setup-build setup-core demo test test-hosts test-core test-clients test-farm test-dist sanitize fuzz deny msrv site skinning-numbers pictures lint gates bench header install install-core hosts hosts-core dist
+.PHONY: setup setup-build setup-core demo test test-hosts test-core test-clients test-farm test-dist sanitize fuzz deny msrv site skinning-numbers pictures lint gates bench header install install-core hosts hosts-core dist wheel test-wheel
 
 # Everything that building and testing need, from Debian's packages; quick when it is there.
 setup:
@@ -134,6 +134,18 @@ sanitize: hosts
 dist: setup
 	$(BUILD)
 	./tools/dist
+
+# Python packages for pip, target/wheels/*.whl: frazil (with the program and Debian's libraries, for glibc 2.35 and newer) and frazil-core (without
+# OpenVDB, for glibc 2.28 and newer). The tools are from PyPI, in target/wheel-tools.
+wheel: setup
+	$(CORE)
+	./tools/wheel core
+	$(BUILD)
+	./tools/wheel full
+
+# The packages in a bare environment.
+test-wheel: wheel
+	./tools/test-wheel
 
 # The tarball in a bare Debian in a folder (debootstrap; needs root and Debian's mirror).
 test-dist: dist hosts

@@ -28,6 +28,8 @@ the one that the system's loader finds.
     blood.step(1 / 60, budget=0.004)
     blood.lent("depth") * blood.info.unit, blood.surface().triangles        # NumPy sees the library's own memory
 
+    frazil.run("walker.toml", "cache/", progress=lambda stage, frame, fraction, seconds_left: print(stage, frame))   # the program
+
 Lengths are metres, times seconds; Y is up. A call that fails raises frazil.Error with one sentence.
 Handles have close(), and can be used in with blocks.
 """
@@ -38,6 +40,7 @@ from .grains import Grains
 from .grid import Grid, Leaf, load, save
 from .mesh import Mesh
 from .mist import Mist
+from .runs import Cancelled, RunError, program, run
 from .shallow import (Absorber, Ball, Box, Capsule, Drain, Drops, Orifice, Scalar, Shallow, Snapshot, Source, Surface)
 from .shallow_detail import ShallowDetail
 from .shallow_stains import Stains
@@ -46,6 +49,8 @@ from .tracker import Particles, Tracker, spacing
 from . import level_set
 
 __all__ = [
-    "ABI_VERSION", "Absorber", "Ball", "Base", "Body", "Box", "Capsule", "Context", "Drain", "Drops", "Error", "Grains", "Grid", "Leaf",
-    "Mesh", "Mist", "Noise", "Orifice", "Particles", "Pool", "Scalar", "Shallow", "ShallowDetail", "Snapshot", "Source", "Stains", "Surface", "Tracker", "level_set", "library", "load", "save", "snow_layer", "spacing", "version",
+    "ABI_VERSION", "Absorber", "Ball", "Base", "Body", "Box", "Cancelled", "Capsule", "Context", "Drain", "Drops", "Error",
+    "Grains", "Grid", "Leaf", "Mesh", "Mist", "Noise", "Orifice", "Particles", "Pool", "RunError", "Scalar", "Shallow",
+    "ShallowDetail", "Snapshot", "Source", "Stains", "Surface", "Tracker", "level_set", "library", "load", "program", "run",
+    "save", "snow_layer", "spacing", "version",
 ]

@@ -1160,6 +1160,78 @@ class Manners(unittest.TestCase):
         self.assertEqual(len(frazil.version()), 3)
 
 
+class Runs(unittest.TestCase):
+    SCENE = """[shot]
+frames = "1-6"
+[snow]
+ground = 0
+area = [-0.3, -0.3, 0.3, 0.3]
+depth = 0.1
+cell = 0.01
+"""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        self.scene = self.folder / "a shot.toml"
+        self.scene.write_text(self.SCENE)
+        # The program that was installed with the library.
+        library = pathlib.Path(os.environ["FRAZIL_LIBRARY"]).resolve()
+        os.environ["FRAZIL_PROGRAM"] = str(library.parents[1] / "bin/frazil")
+        self.addCleanup(os.environ.pop, "FRAZIL_PROGRAM")
+
+    def files(self, name):
+        paths = (path for kind in ("base", "mesh") for path in (self.folder / name / kind).iterdir())
+        return {path.name: path.read_bytes() for path in paths}
+
+    def test_a_run_tells_its_progress_and_gives_its_record(self):
+        told = []
+        record = frazil.run(self.scene, self.folder / "out", progress=lambda *done: told.append(done), frames="1-3", threads=2)
+        self.assertEqual(record["frames"], len(told))
+        self.assertEqual([frame for stage, frame, *_ in told if stage == "base"], [1, 2, 3])
+        self.assertTrue(all(0 <= fraction <= 1 and left >= 0 for *_, fraction, left in told))
+        self.assertEqual(told[-1][2:], (1.0, 0.0))
+        # What exists is not made again.
+        self.assertEqual(frazil.run(self.scene, self.folder / "out", frames="1-3")["frames"], 0)
+
+    def test_a_run_that_was_ended_resumes_to_the_same_bytes(self):
+        frazil.run(self.scene, self.folder / "whole")
+        with self.assertRaises(frazil.Cancelled):
+            frazil.run(self.scene, self.folder / "out", progress=lambda stage, frame, *_: frame < 2)
+        with self.assertRaisesRegex(ZeroDivisionError, "division"):
+            frazil.run(self.scene, self.folder / "out", progress=lambda *_: 1 / 0)
+        frazil.run(self.scene, self.folder / "out", wait=30)
+        self.assertEqual(self.files("out"), self.files("whole"))
+
+    def test_what_is_refused_says_why(self):
+        for settings, status, why in (["snow.depth=-1"], 2, "depth"), (["snow.cell=1e-9"], 2, "cell"):
+            with self.assertRaisesRegex(frazil.RunError, why) as raised, self.assertNoLogs("frazil"):
+                frazil.run(self.scene, self.folder / "out", settings=settings)
+            self.assertEqual(raised.exception.status, status)
+        with self.assertLogs("frazil") as logged:
+            frazil.run(self.scene, self.folder / "thin", frames="1", settings=["snow.depth=0.02"])
+        self.assertRegex(logged.output[0], "WARNING:frazil:.*cells thick")
+        frazil.run(self.scene, self.folder / "out", stages=["base"], settings=["snow.depth=0.05"])
+        with self.assertRaisesRegex(frazil.RunError, "snow.depth"):
+            frazil.run(self.scene, self.folder / "out")
+        frazil.run(self.scene, self.folder / "out", from_frame=1)
+        self.scene.write_text("[shot]\nframes = \"1-2\"\n")
+        with self.assertRaisesRegex(ValueError, "a shot.toml: it must have one of the tables"):
+            frazil.run(self.scene, self.folder / "other")
+        with self.assertRaises(FileNotFoundError):
+            frazil.run(self.folder / "none.toml", self.folder / "other")
+
+    def test_a_missing_program_is_named(self):
+        os.environ["FRAZIL_PROGRAM"] = ""
+        path, os.environ["PATH"] = os.environ["PATH"], str(self.folder)
+        try:
+            with self.assertRaisesRegex(FileNotFoundError, "FRAZIL_PROGRAM"):
+                frazil.program()
+        finally:
+            os.environ["PATH"] = path
+
+
 class Packaging(unittest.TestCase):
     def test_pip_installs_it_and_it_finds_its_library(self):
         version = (ROOT / "Cargo.toml").read_text().split('version = "')[1].split('"')[0]

@@ -82,7 +82,7 @@ fn free_in_words(free: Option<u64>) -> String {
 
 /// The memory that a run is expected to take, and the most that it may take, of `what` if that is not all of it (bytes).
 fn memory_in_words([expected, bound]: [u64; 2], what: &str, limit: u64) -> String {
-    format!("about {} expected, at most {}{what}, of {}", size(expected), size(bound), size(limit))
+    format!("about {} expected,{what} at most {}, of {}", size(expected), size(bound), size(limit))
 }
 
 fn warnings_in_words(warnings: &[String]) -> String {

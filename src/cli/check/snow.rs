@@ -61,11 +61,12 @@ fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
     if let Some(mist) = &report.mist {
         describe_mist(&mut out, mist, limit);
     }
-    let mist = if report.mist.is_some() { ", without mist" } else { "" };
+    let has_mist = report.mist.is_some();
+    let [memory_of, disk_of] = if has_mist { [" without mist", ", without mist"] } else { [""; 2] };
     let memory = [report.memory_forecast_bytes, report.memory_bytes];
-    let _ = writeln!(out, "memory    {}", memory_in_words(memory, mist, limit));
+    let _ = writeln!(out, "memory    {}", memory_in_words(memory, memory_of, limit));
     if let Some(disk) = report.disk_bytes {
-        let _ = writeln!(out, "disk      about {}{}{mist}", size(disk), free_in_words(free));
+        let _ = writeln!(out, "disk      about {}{}{}", size(disk), free_in_words(free), disk_of);
     }
     out
 }

@@ -1,0 +1,131 @@
+"""The program, from Python: a shot is made in a process of its own, which tells its progress, can be ended and resumes."""
+
+import json
+import logging
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+_log = logging.getLogger("frazil")
+# A table or a key that only the scenes of one system have.
+_OF_SYSTEM = re.compile(r"^\s*\[?\s*(snow|surface|shallow)\s*[].=]", re.MULTILINE)
+
+
+class RunError(RuntimeError):
+    """A run that failed; its text is what the program said.
+
+    status: exit code: 1 = a frame could not be made, 2 = the scene, an option or an input was refused, 75 = another run writes into the folder;
+    negative: the signal that ended it."""
+
+    def __init__(self, status, said):
+        super().__init__(said or f"the program ended with {status}")
+        self.status = status
+
+
+class Cancelled(RunError):
+    """A run that `progress` ended. The frames that are done remain, and the same run resumes after them."""
+
+
+def program():
+    """The path of the program: that in FRAZIL_PROGRAM, else that of this package, of the installed tree, or on the PATH.
+
+    Raises FileNotFoundError if there is none."""
+    named = os.environ.get("FRAZIL_PROGRAM")
+    if named:
+        return named
+    here = pathlib.Path(__file__).resolve()
+    # The second: PREFIX/share/frazil/python/frazil/runs.py and PREFIX/bin/frazil
+    near = [folder / "bin" / "frazil" for folder in (here.parent, *here.parents[4:5])]
+    found = next((str(path) for path in near if path.is_file()), None) or shutil.which("frazil")
+    if found is None:
+        raise FileNotFoundError("the program frazil was not found: set FRAZIL_PROGRAM to its path, or put it on the PATH")
+    return found
+
+
+def main():
+    """Becomes the program, with this process's arguments: the command of an installed wheel."""
+    path = program()
+    os.execv(path, [path, *sys.argv[1:]])
+
+
+def system(scene):
+    """The system of a scene file: "snow", "surface" or "shallow".
+
+    Raises ValueError if it is not of one system, OSError if it cannot be read."""
+    found = sorted(set(_OF_SYSTEM.findall(pathlib.Path(scene).read_text(encoding="utf-8"))))
+    if len(found) != 1:
+        raise ValueError(f"{scene}: it must have one of the tables [snow], [surface] and [shallow], and has {' and '.join(found) or 'none'}")
+    return found[0]
+
+
+def run(scene, output, *, progress=None, settings=(), stages=(), frames=None, from_frame=None, threads=None, wait=0.0):
+    """Makes the shot of a scene file in a folder, and returns the run's record: a dict as of `--report`. Frames that exist and match are not
+    made again: a run that was ended resumes.
+
+    progress: called after each frame as progress(stage, frame, fraction, seconds_left), with the fraction of the time (0 to 1); if it returns
+        False, the run is ended
+    settings: texts "key=value" that override the scene's, as --set
+    stages: names of the stages to make, of snow only, as --stage; all without any
+    frames: which frames to write, as --frames: "1-24", "1-240x10", "3,7"
+    from_frame: the frames before this one are kept and the others made again, as --from
+    threads: number of threads; all cores without one
+    wait: time (s) to wait for another run to leave the folder
+
+    Warnings of the program go to the logger "frazil". Raises RunError if the run fails, Cancelled if `progress` ended it; an exception that
+    `progress` raises ends it too."""
+    with tempfile.TemporaryDirectory(prefix="frazil-") as folder:
+        record = pathlib.Path(folder) / "record.json"
+        command = [program(), system(scene), os.fspath(scene), "--output", os.fspath(output), "--progress", "json"]
+        command += ["--report", str(record), "--wait", str(float(wait))]
+        command += [part for setting in settings for part in ("--set", setting)]
+        options = {"--stage": ",".join(stages) or None, "--frames": frames, "--from": from_frame, "--threads": threads}
+        command += [f"{name}={value}" for name, value in options.items() if value is not None]
+        status, said, is_cancelled = _watched(command, progress)
+        if status != 0:
+            raise (Cancelled if is_cancelled else RunError)(status, said)
+        return json.loads(record.read_text(encoding="utf-8"))
+
+
+def _watched(command, progress):
+    """Runs the program; returns its exit code, what it said, and whether `progress` ended it."""
+    said, is_cancelled = [], False
+    process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                               encoding="utf-8", errors="replace")
+    with process:
+        try:
+            for line in process.stderr:
+                done = _done(line)
+                if done is None:
+                    _hear(line.rstrip(), said)
+                elif progress is not None and not is_cancelled and progress(*done) is False:
+                    is_cancelled = True
+                    process.terminate()
+        except BaseException:
+            process.terminate()
+            raise
+    return process.returncode, "\n".join(said), is_cancelled
+
+
+def _hear(line, said):
+    """Passes what the program tells to the logger, and adds what it ends with to `said`."""
+    for level, name in ((logging.WARNING, "warn"), (logging.INFO, "info"), (logging.DEBUG, "debug")):
+        told = line.removeprefix(f"frazil: {name}: ")
+        if told != line:
+            _log.log(level, "%s", told)
+            return
+    said.append(line.removeprefix("frazil: "))
+
+
+def _done(line):
+    """Stage, frame, fraction and seconds left of a line of progress; None for other lines."""
+    if not line.startswith("{"):
+        return None
+    try:
+        done = json.loads(line)
+        return done["stage"], done["frame"], done["fraction"], done["seconds_left"]
+    except (ValueError, KeyError):
+        return None
