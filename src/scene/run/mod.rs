@@ -5,6 +5,7 @@
 //! files that a frame reads and the frames of stages upstream of it (`chain.rs`). A frame is done when its record exists
 //! ([`DoneFrames`]). `cache.rs` knows which frames were made with which settings, `own_files.rs` which files of the folder may be
 //! overwritten. [`Run`] drives everything, [`verify`] compares a folder with its records, `usd.rs` describes the shot to other programs.
+//! [`FrameCosts`] and [`Pace`] are for forecasts of the time that a run still takes.
 
 mod cache;
 mod chain;
