@@ -16,13 +16,13 @@ _OF_SYSTEM = re.compile(r"^\s*\[?\s*(snow|surface|shallow)\s*[].=]", re.MULTILIN
 
 
 class RunError(RuntimeError):
-    """A run that failed; its text is what the program said.
+    """A run that failed; its text is the program's error message.
 
     status: exit code: 1 = a frame could not be made, 2 = the scene, an option or an input was refused, 75 = another run writes into the folder;
     negative: the signal that ended it."""
 
-    def __init__(self, status, said):
-        super().__init__(said or f"the program ended with {status}")
+    def __init__(self, status, message):
+        super().__init__(message or f"the program ended with exit code {status}")
         self.status = status
 
 
@@ -84,43 +84,44 @@ def run(scene, output, *, progress=None, settings=(), stages=(), frames=None, fr
         command += [part for setting in settings for part in ("--set", setting)]
         options = {"--stage": ",".join(stages) or None, "--frames": frames, "--from": from_frame, "--threads": threads}
         command += [f"{name}={value}" for name, value in options.items() if value is not None]
-        status, said, is_cancelled = _watched(command, progress)
+        status, message, is_cancelled = _watched(command, progress)
         if status != 0:
-            raise (Cancelled if is_cancelled else RunError)(status, said)
+            raise (Cancelled if is_cancelled else RunError)(status, message)
         return json.loads(record.read_text(encoding="utf-8"))
 
 
 def _watched(command, progress):
-    """Runs the program; returns its exit code, what it said, and whether `progress` ended it."""
-    said, is_cancelled = [], False
+    """Runs the program; returns its exit code, its error message, and whether `progress` ended it."""
+    errors, is_cancelled = [], False
     process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
                                encoding="utf-8", errors="replace")
     with process:
         try:
             for line in process.stderr:
-                done = _done(line)
+                done = _finished_frame(line)
                 if done is None:
-                    _hear(line.rstrip(), said)
+                    if not _logged(line.rstrip()):
+                        errors.append(line.rstrip().removeprefix("frazil: "))
                 elif progress is not None and not is_cancelled and progress(*done) is False:
                     is_cancelled = True
                     process.terminate()
         except BaseException:
             process.terminate()
             raise
-    return process.returncode, "\n".join(said), is_cancelled
+    return process.returncode, "\n".join(errors), is_cancelled
 
 
-def _hear(line, said):
-    """Passes what the program tells to the logger, and adds what it ends with to `said`."""
+def _logged(line):
+    """Passes a warning or note of the program to the logger; returns whether the line was one."""
     for level, name in ((logging.WARNING, "warn"), (logging.INFO, "info"), (logging.DEBUG, "debug")):
-        told = line.removeprefix(f"frazil: {name}: ")
-        if told != line:
-            _log.log(level, "%s", told)
-            return
-    said.append(line.removeprefix("frazil: "))
+        prefix = f"frazil: {name}: "
+        if line.startswith(prefix):
+            _log.log(level, "%s", line.removeprefix(prefix))
+            return True
+    return False
 
 
-def _done(line):
+def _finished_frame(line):
     """Stage, frame, fraction and seconds left of a line of progress; None for other lines."""
     if not line.startswith("{"):
         return None
