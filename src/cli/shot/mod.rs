@@ -82,8 +82,8 @@ impl ShotArgs {
         Ok(frames)
     }
 
-    /// Makes the frames of a pipeline. `costs` gives what they are expected to take; `on_report` is called with the report of each, by one
-    /// thread at a time.
+    /// Makes the frames of a pipeline. `costs` estimates their costs, for the time left; `on_report` is called with the report of each, by
+    /// one thread at a time.
     pub fn make(
         &self,
         session: &Session,
@@ -113,7 +113,16 @@ impl ShotArgs {
             return Err(Failure::failed(what));
         }
         let format = self.progress.unless(session.is_quiet());
-        let costs = format.map(|_| costs(&to_make)).transpose().or_fail()?.unwrap_or_default();
+        // An input that cannot be read fails the frame that reads it, not the frames before.
+        let costs = match format.map(|_| costs(&to_make)) {
+            Some(Err(error @ Error::Cancelled)) => return Err(error).or_fail(),
+            Some(Err(error)) => {
+                log::debug!("the time left is estimated without a forecast: {error}");
+                FrameCosts::default()
+            }
+            Some(Ok(costs)) => costs,
+            None => FrameCosts::default(),
+        };
         let remaining = Remaining::of(&to_make, &costs, Instant::now());
         let display = FrameProgress::new(&session.ctx, remaining, existing, format);
         let display = Mutex::new((display, on_report));

@@ -1,4 +1,4 @@
-//! How long a run still takes, by what the frames of its stages took so far, and by what they are expected to cost.
+//! Estimates the time that a run still takes, from the times of finished frames and the expected costs of all frames.
 
 use std::time::{Duration, Instant};
 

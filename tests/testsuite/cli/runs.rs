@@ -45,6 +45,23 @@ fn a_scene_makes_frames_and_its_resolved_file_makes_them_again() {
 }
 
 #[test]
+fn a_damaged_frame_of_an_object_costs_no_frame_before_it() {
+    let folder = folder(4, 0.05, CUBE);
+    (1..=4).for_each(|frame| fs::write(folder.join(format!("cube.{frame:04}.obj")), CUBE).unwrap());
+    fs::write(folder.join("cube.0003.obj"), CUBE.replacen("v ", "v nan ", 1)).unwrap();
+    // With and without an estimate of the time left, which reads all frames of the object before the first frame is made.
+    for (out, options) in [("shown", ""), ("quiet", "-q")] {
+        let scene = "snow shot.toml --set object.1.file=cube.%04d.obj --set object.1.keys=[]";
+        let output = frazil(&folder, &format!("{scene} -o {out} {options}"));
+        assert_eq!(output.status.code(), Some(1), "{out}");
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert!(stderr.contains("cube.0003.obj: "), "{stderr}");
+        let made = [1, 2, 3].map(|frame| folder.join(format!("{out}/base/base.{frame:04}.vdb")).exists());
+        assert_eq!(made, [true, true, false], "{out}");
+    }
+}
+
+#[test]
 fn progress_is_a_line_of_json_for_each_frame() {
     let folder = folder(3, 0.05, CUBE);
     let said = works(&folder, "snow shot.toml -o out --progress json");

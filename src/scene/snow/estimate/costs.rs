@@ -1,5 +1,5 @@
-//! What the frames of each stage take, estimated before they are made, so that a run can say how long it will take. The seconds were measured
-//! on two cores of an AMD EPYC 9V74; what they are on another computer does not matter, only how stages and frames compare.
+//! The time that the frames of each stage take, estimated before they are made, so that a run can show how much is left. The seconds were
+//! measured on two cores of an AMD EPYC; another computer may be faster or slower, only the ratios of stages and frames count.
 
 use std::path::Path;
 
