@@ -46,7 +46,7 @@
 /**
  * Version of the interface that this header describes: major << 16 | minor.
  */
-#define FRZ_ABI_VERSION 0x10008
+#define FRZ_ABI_VERSION 0x10009
 
 /**
  * Major version of frazil that this header belongs to.
@@ -78,6 +78,11 @@
  * Flag of a body: frz_body.compression replaces frz_grains_params.compression for the snow that the body removes.
  */
 #define FRZ_BODY_COMPRESSION 2
+
+/**
+ * Flag of a frz_geometry_part: it has a colour.
+ */
+#define FRZ_GEOMETRY_HAS_COLOR 1
 
 /**
  * Flag of frz_grains_params: there is a level ground at frz_grains_params.floor.
@@ -411,6 +416,76 @@ typedef uint32_t frz_mesh_part;
 #endif // __cplusplus
 
 #if defined(FRZ_HAS_OPENVDB)
+/**
+ * The elements of a mesh that an array has values for.
+ */
+enum frz_geometry_element
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Vertices, or points.
+     */
+    FRZ_GEOMETRY_VERTICES = 0,
+    /**
+     * Corners of faces, in the order of frz_geometry_part.indices: an array with seams.
+     */
+    FRZ_GEOMETRY_CORNERS = 1,
+    /**
+     * Faces.
+     */
+    FRZ_GEOMETRY_FACES = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_geometry_element frz_geometry_element;
+#else
+typedef uint32_t frz_geometry_element;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * The type of an array's numbers.
+ */
+enum frz_number
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * float.
+     */
+    FRZ_NUMBER_FLOAT = 0,
+    /**
+     * double.
+     */
+    FRZ_NUMBER_DOUBLE = 1,
+    /**
+     * int32_t.
+     */
+    FRZ_NUMBER_INT32 = 2,
+    /**
+     * uint32_t.
+     */
+    FRZ_NUMBER_UINT32 = 3,
+    /**
+     * int64_t.
+     */
+    FRZ_NUMBER_INT64 = 4,
+    /**
+     * uint8_t; also for truth values, 0 and 1.
+     */
+    FRZ_NUMBER_UINT8 = 5,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum frz_number frz_number;
+#else
+typedef uint32_t frz_number;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
 /**
  * Fields that frz_mist_grid returns.
  */
@@ -1024,6 +1099,11 @@ typedef struct frz_context frz_context;
 
 #if defined(FRZ_HAS_OPENVDB)
 /**
+ * The meshes and points of a file.
+ */
+typedef struct frz_geometry frz_geometry;
+
+/**
  * Grains of snow, all of one size.
  */
 typedef struct frz_grains frz_grains;
@@ -1566,6 +1646,78 @@ typedef struct {
      */
     int32_t seed;
 } frz_noise;
+
+/**
+ * A mesh, or points, of a file.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_geometry_part), set by the caller.
+     */
+    uint32_t struct_size;
+    /**
+     * 0 or FRZ_GEOMETRY_HAS_COLOR.
+     */
+    uint32_t flags;
+    /**
+     * Name of its prim in a USD file; empty for other files, which have one part. Lent.
+     */
+    const char *name;
+    /**
+     * float[3] for each vertex or point, Y up; metres where the file states its unit.
+     */
+    frz_view positions;
+    /**
+     * uint32_t for each face: its number of corners; none for points.
+     */
+    frz_view face_counts;
+    /**
+     * uint32_t for each corner of each face: its vertex. Faces are counter-clockwise seen from outside.
+     */
+    frz_view indices;
+    /**
+     * Number of arrays for frz_geometry_get_array.
+     */
+    size_t array_count;
+    /**
+     * With FRZ_GEOMETRY_HAS_COLOR: the colour of all of it, as the file has it; else zeroes.
+     */
+    float color[3];
+    /**
+     * 0.
+     */
+    uint32_t reserved;
+} frz_geometry_part;
+
+/**
+ * A named array of a part.
+ */
+typedef struct {
+    /**
+     * sizeof(frz_geometry_array), set by the caller.
+     */
+    uint32_t struct_size;
+    /**
+     * A frz_geometry_element.
+     */
+    uint32_t element;
+    /**
+     * A frz_number.
+     */
+    uint32_t number;
+    /**
+     * Numbers of each element: 1, 2 or 3.
+     */
+    uint32_t components;
+    /**
+     * Name in UTF-8, not empty. Lent.
+     */
+    const char *name;
+    /**
+     * As many numbers as components for each element, finite or not.
+     */
+    frz_view values;
+} frz_geometry_array;
 
 /**
  * Description of a layer of snow: the ground and the depth.
@@ -2836,6 +2988,38 @@ typedef struct {
     double rate;
 } frz_shallow_staining;
 
+#if defined(FRZ_HAS_OPENVDB)
+/**
+ * A grid of a file, as its description says.
+ */
+typedef struct {
+    /**
+     * Name in UTF-8, zero-terminated.
+     */
+    char name[128];
+    /**
+     * OpenVDB's name of the type of its values, zero-terminated: "float", "vec3s", "ptdataidx32" for points ...
+     */
+    char value_type[32];
+    /**
+     * Edge of a voxel along x (m).
+     */
+    double voxel_size;
+    /**
+     * Extinction (1/m) of a density of 1, as the file states it; negative: it does not.
+     */
+    double density_scale;
+    /**
+     * A frz_grid_class.
+     */
+    uint32_t grid_class;
+    /**
+     * 1 if its values have 16 bits in the file, else 0.
+     */
+    uint32_t half;
+} frz_grid_entry;
+#endif
+
 /**
  * A drop of liquid in the air.
  */
@@ -3448,6 +3632,21 @@ frz_status frz_grid_to_bytes(frz_context *context,
                              size_t *size);
 
 /**
+ * Lists the grids of a .vdb file, of any type, sorted by name, without reading their values.
+ *
+ * path: UTF-8.
+ * dst: room for a frz_grid_entry for each grid; FRZ_ERROR_CAPACITY if it is too small, and nothing is written. With data NULL only the count
+ *     is reported.
+ * count: receives the number of grids; 0 after a failure. May be NULL.
+ *
+ * FRZ_ERROR_FILE for a file that is damaged, or has a name of over 127 bytes. One thread at a time for each context.
+ */
+frz_status frz_grid_list(frz_context *context,
+                         const char *path,
+                         frz_span dst,
+                         size_t *count);
+
+/**
  * Reads a grid of floats or of vectors from a .vdb file that may be damaged, as frz_grid_load does, but in another process.
  *
  * OpenVDB does not survive every kind of damage: a file with a flipped bit can crash frz_grid_load, and the host with it, or make it run
@@ -3587,6 +3786,65 @@ frz_status frz_levelset_sweep(frz_context *context,
                               double voxel_size,
                               float half_width,
                               frz_grid **out);
+
+/**
+ * Reads the meshes or points of a file: .usdc and .usd (a part for each mesh or, if there is none, for the points), .ply, .obj, .stl, .bgeo,
+ * .vtk, .vtu, .xyz, and the points of a .vdb.
+ *
+ * Arrays have the same names and types in every format: the components `vx`, `vy` and `vz` of a .ply are `v`, float[3], like the velocities
+ * in USD; `red`, `green` and `blue` are `color`, of which bytes are divided by 255; texture coordinates are `uv`, float[2]. Points have `v`
+ * (m/s), `id`, `pscale` (radius, m) and whatever else their file has.
+ *
+ * path: UTF-8.
+ * out: receives the parts, to be destroyed with frz_geometry_destroy; NULL after a failure. FRZ_ERROR_FILE for a file that is empty, cut
+ *     short or damaged, or holds neither meshes nor points.
+ *
+ * One thread at a time for each context.
+ */
+frz_status frz_geometry_load(frz_context *context,
+                             const char *path,
+                             frz_geometry **out);
+
+/**
+ * Destroys what frz_geometry_load made, and with it all that was lent; NULL is ignored.
+ *
+ * geometry: may be NULL.
+ *
+ * One thread at a time.
+ */
+void frz_geometry_destroy(frz_geometry *geometry);
+
+/**
+ * Reports the number of parts.
+ *
+ * count: receives it.
+ *
+ * Any number of threads may read it.
+ */
+frz_status frz_geometry_count(const frz_geometry *geometry, size_t *count);
+
+/**
+ * Lends a part's name, positions and faces, until frz_geometry_destroy.
+ *
+ * index: less than frz_geometry_count reports; FRZ_ERROR_ARGUMENT otherwise.
+ * part: receives them. The caller sets its struct_size.
+ *
+ * Any number of threads may read it.
+ */
+frz_status frz_geometry_get_part(const frz_geometry *geometry, size_t index, frz_geometry_part *part);
+
+/**
+ * Lends an array of a part, until frz_geometry_destroy.
+ *
+ * part: less than frz_geometry_count reports; index: less than frz_geometry_part.array_count. FRZ_ERROR_ARGUMENT otherwise.
+ * array: receives it. The caller sets its struct_size.
+ *
+ * Any number of threads may read it.
+ */
+frz_status frz_geometry_get_array(const frz_geometry *geometry,
+                                  size_t part,
+                                  size_t index,
+                                  frz_geometry_array *array);
 
 /**
  * Fills a description with the defaults: voxels of 1 cm, 0.3 m of snow on a square of 2 m at y = 0.

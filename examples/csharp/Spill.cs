@@ -11,7 +11,7 @@ using System.Runtime.InteropServices;
 /// <summary>The part of frazil.h that is used here, name by name.</summary>
 static class Frazil {
     const string Library = "frazil_core"; /* libfrazil_core.so, frazil_core.dll */
-    public const uint AbiVersion = 0x10008, LeftHanded = 2, LiquidWater = 0, Source = 0, Drain = 1, Open = 1;
+    public const uint AbiVersion = 0x10009, LeftHanded = 2, LiquidWater = 0, Source = 0, Drain = 1, Open = 1;
 
     [StructLayout(LayoutKind.Sequential)]
     public struct View {

@@ -7,7 +7,7 @@ the one that the system's loader finds.
     ctx = frazil.Context(threads=2)
     base = frazil.Base(ctx, frazil.snow_layer(ctx, depth=0.3, voxel_size=0.01, area=(-1, -1, 1, 1)))
     base.step([frazil.Body(points_before, points_after, triangles)], dt=1 / 24, frame=1)
-    frazil.save(ctx, [base.grid, base.compression], "pressed.vdb")
+    frazil.save_grids(ctx, [base.grid, base.compression], "pressed.vdb")
 
     grains = frazil.Grains(ctx, radius=0.01 / 3)
     grains.step(base, bodies, dt=1 / 24, frame=1)   # after each step of the base, with the same bodies
@@ -15,7 +15,7 @@ the one that the system's loader finds.
 
     mist = frazil.Mist(ctx, cell=0.04 / 3)
     mist.step(grains, base, bodies, time=0.0, dt=1 / 24)   # after each step of the grains
-    frazil.save(ctx, [mist.density(ctx)], "mist.vdb")
+    frazil.save_grids(ctx, [mist.density(ctx)], "mist.vdb")
 
     tracker = frazil.Tracker(ctx, mesh, first, spacing=frazil.spacing(ctx, first))   # first: frazil.Particles
     tracker.step(first, second, dt=1 / 24)
@@ -29,6 +29,8 @@ the one that the system's loader finds.
     blood.lent("depth") * blood.info.unit, blood.surface().triangles        # NumPy sees the library's own memory
 
     frazil.run("walker.toml", "cache/", progress=lambda stage, frame, fraction, seconds_left: print(stage, frame))   # the program
+    frame = frazil.load("cache/", 48)                       # what a frame holds
+    frame.meshes["mesh/base"].positions, frame.points["grains/grains"].velocities, frame.volumes["mist"].grids
 
 Lengths are metres, times seconds; Y is up. A call that fails raises frazil.Error with one sentence.
 Handles have close(), and can be used in with blocks.
@@ -37,7 +39,9 @@ Handles have close(), and can be used in with blocks.
 from ._library import ABI_VERSION, Error, library, version
 from .context import Context, Pool
 from .grains import Grains
-from .grid import Grid, Leaf, load, save
+from .frames import Frame, Shot, Volume, load
+from .geometry import Array, Part, load_geometry
+from .grid import Grid, Leaf, list_grids, load_grid, save_grids
 from .mesh import Mesh
 from .mist import Mist
 from .runs import Cancelled, RunError, program, run
@@ -49,8 +53,9 @@ from .tracker import Particles, Tracker, spacing
 from . import level_set
 
 __all__ = [
-    "ABI_VERSION", "Absorber", "Ball", "Base", "Body", "Box", "Cancelled", "Capsule", "Context", "Drain", "Drops", "Error",
-    "Grains", "Grid", "Leaf", "Mesh", "Mist", "Noise", "Orifice", "Particles", "Pool", "RunError", "Scalar", "Shallow",
-    "ShallowDetail", "Snapshot", "Source", "Stains", "Surface", "Tracker", "level_set", "library", "load", "program", "run",
-    "save", "snow_layer", "spacing", "version",
+    "ABI_VERSION", "Absorber", "Array", "Ball", "Base", "Body", "Box", "Cancelled", "Capsule", "Context", "Drain", "Drops",
+    "Error", "Frame", "Grains", "Grid", "Leaf", "Mesh", "Mist", "Noise", "Orifice", "Part", "Particles", "Pool", "RunError",
+    "Scalar", "Shallow", "ShallowDetail", "Shot", "Snapshot", "Source", "Stains", "Surface", "Tracker", "Volume", "level_set",
+    "library", "list_grids", "load", "load_geometry", "load_grid", "program", "run", "save_grids", "snow_layer", "spacing",
+    "version",
 ]

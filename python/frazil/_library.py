@@ -9,7 +9,7 @@ import threading
 
 import numpy as np
 
-ABI_VERSION = 0x10008
+ABI_VERSION = 0x10009
 
 OK, CANCELLED = 0, 5
 
@@ -88,6 +88,27 @@ class GridInfo(Struct):
         ("background", c.c_float), ("world_fixed", c.c_uint32), ("active_voxels", c.c_uint64),
         ("leaf_count", c.c_uint64), ("memory_bytes", c.c_uint64), ("voxel_min", c.c_int32 * 3),
         ("voxel_max", c.c_int32 * 3), ("value_type", c.c_uint32), ("background_vector", c.c_float * 3),
+    ]
+
+
+class GridEntry(Struct):
+    _fields_ = [
+        ("name", c.c_char * 128), ("value_type", c.c_char * 32), ("voxel_size", c.c_double), ("density_scale", c.c_double),
+        ("grid_class", c.c_uint32), ("half", c.c_uint32),
+    ]
+
+
+class GeometryPart(c.Structure):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("flags", c.c_uint32), ("name", c.c_char_p), ("positions", View), ("face_counts", View),
+        ("indices", View), ("array_count", c.c_size_t), ("color", c.c_float * 3), ("reserved", c.c_uint32),
+    ]
+
+
+class GeometryArray(c.Structure):
+    _fields_ = [
+        ("struct_size", c.c_uint32), ("element", c.c_uint32), ("number", c.c_uint32), ("components", c.c_uint32),
+        ("name", c.c_char_p), ("values", View),
     ]
 
 
@@ -355,7 +376,8 @@ STRUCTS = {
     "frz_shallow_distance": ShallowDistance, "frz_shallow_fitted": ShallowFitted, "frz_shallow_scalar": ShallowScalar,
     "frz_shallow_scalar_balance": ShallowScalarBalance, "frz_shallow_drop": ShallowDrop,
     "frz_shallow_load": ShallowLoad, "frz_shallow_staining": ShallowStaining,
-    "frz_shallow_drops_target": ShallowDropsTarget,
+    "frz_shallow_drops_target": ShallowDropsTarget, "frz_grid_entry": GridEntry, "frz_geometry_part": GeometryPart,
+    "frz_geometry_array": GeometryArray,
 }
 
 POLL = c.CFUNCTYPE(c.c_int, c.c_void_p, c.POINTER(Progress))
@@ -373,7 +395,8 @@ _FUNCTIONS = {
     "grid_vector_leaves": [_P, Span, _P], "grid_vector_probe": [_P, View, Span],
     "grid_sample_vectors": [_P, _P, View, _U, Span], "grid_probe": [_P, View, Span], "grid_sample": [_P, _P, View, _U, Span],
     "grid_sample_mesh": [_P, _P, _P, _U, _S], "grid_to_mesh": [_P, _P, _F, _F, _P],
-    "grid_load": [_P, _S, _S, _P], "grid_save": [_P, _P, _Z, _S, _U, _U],
+    "geometry_load": [_P, _S, _P], "geometry_count": [_P, _P], "geometry_get_part": [_P, _Z, _P],
+    "geometry_get_array": [_P, _Z, _Z, _P], "grid_list": [_P, _S, Span, _P], "grid_load": [_P, _S, _S, _P], "grid_save": [_P, _P, _Z, _S, _U, _U],
     "grid_from_bytes": [_P, _P, _Z, _S, _P], "grid_to_bytes": [_P, _P, _Z, _U, _U, _P, _Z, _P],
     "levelset_from_mesh": [_P, _P, _D, _F, _P], "levelset_from_particles": [_P, View, View, _D, _F, _P],
     "levelset_csg": [_P, _U, _P, _P], "levelset_offset": [_P, _P, _F, _U],
@@ -437,7 +460,7 @@ _FUNCTIONS = {
 }
 _VOID = ["pool_destroy", "context_destroy", "context_cancel", "context_reset", "mesh_destroy", "grid_destroy",
          "base_destroy", "grains_destroy", "mist_destroy", "tracker_destroy", "shallow_destroy",
-         "shallow_snapshot_destroy", "shallow_stains_destroy", "shallow_detail_destroy"]
+         "geometry_destroy", "shallow_snapshot_destroy", "shallow_stains_destroy", "shallow_detail_destroy"]
 _LENT = ["base_grid", "base_removed", "base_compression", "base_touched"]
 
 
@@ -580,6 +603,8 @@ def _kind_of(name):
     """The kind of object that a function creates."""
     if name.startswith(("grid_to_mesh", "mesh_")):
         return "mesh"
+    if name == "geometry_load":
+        return "geometry"
     kind, create, _ = name.rpartition("_create")
     return kind if create else "grid"
 

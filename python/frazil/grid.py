@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._library import GridDesc, GridInfo, Handle, LeafView, Span, VectorLeafView, call, made, rows, span, text, view
+from ._library import GridDesc, GridEntry, GridInfo, Handle, LeafView, Span, VectorLeafView, call, made, rows, span, text, view
 from .mesh import Mesh
 
 UNKNOWN, LEVEL_SET, FOG, STAGGERED = 0, 1, 2, 3
@@ -157,13 +157,34 @@ def _leaf(leaf, vectors):
     return Leaf(tuple(leaf.origin), values, active)
 
 
-def load(ctx, path, name=None):
+class Listed(NamedTuple):
+    """A grid of a file: its name, the type of its values ("float", "vec3s", "ptdataidx32" for points ...), the edge of a voxel (m), its class
+    (0 unknown, 1 level set, 2 fog, 3 staggered), and the extinction (1/m) of a density of 1, or None if the file does not state it."""
+
+    name: str
+    value_type: str
+    voxel_size: float
+    grid_class: int
+    density_scale: object
+
+
+def list_grids(ctx, path):
+    """The grids of a .vdb file, of any type, sorted by name: a list of Listed. Their values are not read."""
+    count = c.c_size_t()
+    call("grid_list", ctx.pointer, text(path), Span(None, 0, 0), c.byref(count))
+    entries = (GridEntry * max(count.value, 1))()
+    call("grid_list", ctx.pointer, text(path), Span(c.addressof(entries), count.value, 0), c.byref(count))
+    return [Listed(entry.name.decode(), entry.value_type.decode(), entry.voxel_size, entry.grid_class,
+                   entry.density_scale if entry.density_scale >= 0 else None) for entry in entries[: count.value]]
+
+
+def load_grid(ctx, path, name=None):
     """Reads a grid from a .vdb file. Without a name it is the first level set, else the first grid of floats, else
     the first of vectors."""
     return Grid(made("grid_load", ctx.pointer, text(path), text(name)))
 
 
-def save(ctx, grids, path, compression=BLOSC, half=False):
+def save_grids(ctx, grids, path, compression=BLOSC, half=False):
     """Writes grids with different names into one .vdb file."""
     pointers = (c.c_void_p * len(grids))(*[grid.pointer for grid in grids])
     call("grid_save", ctx.pointer, pointers, len(grids), text(path), compression, int(half))

@@ -1,18 +1,24 @@
 """The program, from Python: a shot is made in a process of its own, which tells its progress, can be ended and resumes."""
 
+import contextlib
 import json
 import logging
 import os
 import pathlib
+import queue
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
+import threading
+import time
 
 _log = logging.getLogger("frazil")
 # A table or a key that only the scenes of one system have.
 _OF_SYSTEM = re.compile(r"^\s*\[?\s*(snow|surface|shallow)\s*[].=]", re.MULTILINE)
+# Time (s) between two calls of `cancelled`.
+_POLL = 0.5
 
 
 class RunError(RuntimeError):
@@ -27,7 +33,7 @@ class RunError(RuntimeError):
 
 
 class Cancelled(RunError):
-    """A run that `progress` ended. The frames that are done remain, and the same run resumes after them."""
+    """A run that `progress` or `cancelled` ended. The frames that are done remain, and the same run resumes after them."""
 
 
 def program():
@@ -62,53 +68,93 @@ def system(scene):
     return found[0]
 
 
-def run(scene, output, *, progress=None, settings=(), stages=(), frames=None, from_frame=None, threads=None, wait=0.0):
+def run(scene, output, *, progress=None, cancelled=None, started=None, settings=(), stages=(), frames=None, from_frame=None, preview=None,
+        threads=None, wait=0.0):
     """Makes the shot of a scene file in a folder, and returns the run's record: a dict as of `--report`. Frames that exist and match are not
     made again: a run that was ended resumes.
 
     progress: called after each frame as progress(stage, frame, fraction, seconds_left), with the fraction of the time (0 to 1); if it returns
         False, the run is ended
+    cancelled: called twice a second, from the start and between frames; if it returns True, the run is ended. Like `progress`, it is called
+        in the thread that called run()
+    started: called once, with the id of the program's process, as soon as it runs
     settings: texts "key=value" that override the scene's, as --set
     stages: names of the stages to make, of snow only, as --stage; all without any
     frames: which frames to write, as --frames: "1-24", "1-240x10", "3,7"
     from_frame: the frames before this one are kept and the others made again, as --from
+    preview: whole number, of snow only, as --preview: the cells are so many times as large
     threads: number of threads; all cores without one
     wait: time (s) to wait for another run to leave the folder
 
-    Warnings of the program go to the logger "frazil". Raises RunError if the run fails, Cancelled if `progress` ended it; an exception that
-    `progress` raises ends it too."""
+    Warnings of the program go to the logger "frazil". Raises RunError if the run fails, Cancelled if `progress` or `cancelled` ended it; an
+    exception that one of these functions raises ends it too."""
     with tempfile.TemporaryDirectory(prefix="frazil-") as folder:
         record = pathlib.Path(folder) / "record.json"
         command = [program(), system(scene), os.fspath(scene), "--output", os.fspath(output), "--progress", "json"]
         command += ["--report", str(record), "--wait", str(float(wait))]
         command += [part for setting in settings for part in ("--set", setting)]
-        options = {"--stage": ",".join(stages) or None, "--frames": frames, "--from": from_frame, "--threads": threads}
+        options = {"--stage": ",".join(stages) or None, "--frames": frames, "--from": from_frame, "--preview": preview, "--threads": threads}
         command += [f"{name}={value}" for name, value in options.items() if value is not None]
-        status, message, is_cancelled = _watched(command, progress)
+        status, message, is_cancelled = _watched(command, progress, cancelled, started)
         if status != 0:
             raise (Cancelled if is_cancelled else RunError)(status, message)
         return json.loads(record.read_text(encoding="utf-8"))
 
 
-def _watched(command, progress):
-    """Runs the program; returns its exit code, its error message, and whether `progress` ended it."""
+def _watched(command, progress, cancelled, started):
+    """Runs the program; returns its exit code, its error message, and whether `progress` or `cancelled` ended it."""
     errors, is_cancelled = [], False
     process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
                                encoding="utf-8", errors="replace")
-    with process:
+    with process, contextlib.closing(_lines(process.stderr)) as lines:
         try:
-            for line in process.stderr:
-                done = _finished_frame(line)
-                if done is None:
-                    if not _logged(line.rstrip()):
-                        errors.append(line.rstrip().removeprefix("frazil: "))
-                elif progress is not None and not is_cancelled and progress(*done) is False:
+            if started is not None:
+                started(process.pid)
+            for line in lines:
+                wants_end = False
+                if line is None:
+                    wants_end = cancelled is not None and cancelled()
+                elif done := _finished_frame(line):
+                    wants_end = progress is not None and not is_cancelled and progress(*done) is False
+                elif not _logged(line.rstrip()):
+                    errors.append(line.rstrip().removeprefix("frazil: "))
+                if wants_end and not is_cancelled:
                     is_cancelled = True
                     process.terminate()
         except BaseException:
             process.terminate()
             raise
     return process.returncode, "\n".join(errors), is_cancelled
+
+
+def _lines(stream):
+    """The lines of a stream as they come, and None at the start and every `_POLL` seconds, however many lines come."""
+    lines = queue.SimpleQueue()
+
+    def read():
+        for line in stream:
+            lines.put(line)
+        lines.put(None)
+
+    # Reading blocks: it has a thread of its own, so that the caller's can poll.
+    reader = threading.Thread(target=read, name="frazil-lines", daemon=True)
+    reader.start()
+    try:
+        poll = time.monotonic()
+        while True:
+            left = poll - time.monotonic()
+            try:
+                line = lines.get(timeout=left) if left > 0.0 else None
+            except queue.Empty:
+                continue
+            if left <= 0.0:
+                poll = time.monotonic() + _POLL
+            elif line is None:
+                return
+            yield line
+    finally:
+        # The process ends, or was told to: nobody closes the stream under the reader.
+        reader.join()
 
 
 def _logged(line):

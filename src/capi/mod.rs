@@ -26,6 +26,9 @@ pub mod grid;
 pub mod level_set;
 
 #[cfg(feature = "vdb")]
+pub mod geometry;
+
+#[cfg(feature = "vdb")]
 pub mod snow;
 
 pub mod tracker;

@@ -1,6 +1,6 @@
 //! `frazil new`: a scene to start from.
 
-use frazil::scene::{self, reference, template};
+use frazil::scene::{self, keys_json, reference, template};
 
 use super::output;
 use super::session::{Failure, OrFailure};
@@ -15,6 +15,9 @@ pub struct Args {
     /// Print a table of all keys in Markdown instead: values, defaults, meaning.
     #[arg(long)]
     keys: bool,
+    /// With `--keys`: print JSON, for programs that build an interface from the keys.
+    #[arg(long, requires = "keys")]
+    json: bool,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -34,5 +37,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         System::Surface => scene::System::Surface,
         System::Shallow => scene::System::Shallow,
     };
+    if args.json {
+        return output::print(&format!("{:#}\n", keys_json(system))).or_fail();
+    }
     output::print(&if args.keys { reference(system) } else { template(system) }).or_fail()
 }

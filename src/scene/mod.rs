@@ -38,7 +38,7 @@ pub use snow::{
     partial,
 };
 pub use surface::Surface;
-pub use systems::{Take, reference, template};
+pub use systems::{Take, keys_json, reference, template};
 
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;

@@ -25,8 +25,8 @@ def our_box():
     with frazil.Context(threads=2) as ctx:
         grid = frazil.level_set.from_mesh(ctx, frazil.Mesh(ctx, corners, faces), voxel_size=0.005)
         grid.name = "surface"
-        frazil.save(ctx, [grid], ours)
-        read = frazil.load(ctx, ours)
+        frazil.save_grids(ctx, [grid], ours)
+        read = frazil.load_grid(ctx, ours)
         assert read.info.active_voxels == grid.info.active_voxels
         volume = read.to_mesh(ctx).info.volume
         assert abs(volume - 0.008) < 1e-4, volume
@@ -63,7 +63,7 @@ if other is not None:
     (read,), _ = other.readAll(ours)
     assert read.activeVoxelCount() == voxels
     with frazil.Context(threads=2) as ctx:
-        assert frazil.load(ctx, theirs).info.active_voxels == ball
+        assert frazil.load_grid(ctx, theirs).info.active_voxels == ball
     assert their_ball(other) == ball
 if "bpy" in modules:
     vertices = as_blender_sees(modules["bpy"], ours)

@@ -2,6 +2,7 @@
 
 import gc
 import importlib.util
+import json
 import os
 import pathlib
 import re
@@ -87,8 +88,8 @@ class Snow(unittest.TestCase):
         self.assertEqual({stage for stage, _ in ctx.timings()} >= {"bodies", "distance", "commit"}, True)
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, "snow.vdb")
-            frazil.save(ctx, [base.grid, base.removed, base.compression, base.touched], path)
-            again = frazil.load(ctx, path, "surface")
+            frazil.save_grids(ctx, [base.grid, base.removed, base.compression, base.touched], path)
+            again = frazil.load_grid(ctx, path, "surface")
             self.assertEqual(again.info.active_voxels, base.grid.info.active_voxels)
             try:
                 import pyopenvdb
@@ -167,12 +168,12 @@ class Snow(unittest.TestCase):
         ball.name = "ball"
         with tempfile.TemporaryDirectory() as folder:
             path, mirrored = os.path.join(folder, "ball.vdb"), os.path.join(folder, "mirrored.vdb")
-            frazil.save(ctx, [ball], path)
+            frazil.save_grids(ctx, [ball], path)
             grid = pyopenvdb.read(path, "ball")
             grid.transform = pyopenvdb.createLinearTransform(
                 [[-0.02, 0, 0, 0], [0, 0.02, 0, 0], [0, 0, 0.02, 0], [0, 0, 0, 1]])
             pyopenvdb.write(mirrored, grids=[grid])
-            mesh = frazil.load(ctx, mirrored).to_mesh(ctx)
+            mesh = frazil.load_grid(ctx, mirrored).to_mesh(ctx)
         self.assertAlmostEqual(mesh.info.volume, 4 / 3 * np.pi * 0.3**3, delta=0.002)
         self.assertLess(mesh.info.box_max[0], 0.25)
 
@@ -898,8 +899,8 @@ class Vectors(unittest.TestCase):
         self.assertEqual(tuple(grid.info.background_vector), (0, -1, 2))
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, "vel.vdb")
-            frazil.save(ctx, [grid, snow(ctx)], path)
-            loaded = frazil.load(ctx, path, "vel")
+            frazil.save_grids(ctx, [grid, snow(ctx)], path)
+            loaded = frazil.load_grid(ctx, path, "vel")
         for other in (grid, grid.copy(ctx), loaded, frazil.Grid.from_bytes(ctx, grid.to_bytes(ctx))):
             self.assertTrue(other.is_vectors)
             back = other.leaves()
@@ -936,7 +937,7 @@ class Vectors(unittest.TestCase):
         leaves, grid = self.wind(ctx)
         with tempfile.TemporaryDirectory() as folder:
             ours, theirs = os.path.join(folder, "ours.vdb"), os.path.join(folder, "theirs.vdb")
-            frazil.save(ctx, [grid], ours)
+            frazil.save_grids(ctx, [grid], ours)
             read = pyopenvdb.read(ours, "vel")
             self.assertEqual((type(read).__name__, read.activeVoxelCount()), ("Vec3SGrid", 5 * 64 + 512))
             self.assertEqual(read.background, (0, -1, 2))
@@ -948,11 +949,11 @@ class Vectors(unittest.TestCase):
             mask = pyopenvdb.BoolGrid(False)
             mask.name = "mask"
             pyopenvdb.write(theirs, grids=[read, mask])
-            back = frazil.load(ctx, theirs, "vel")
+            back = frazil.load_grid(ctx, theirs, "vel")
             np.testing.assert_array_equal(back.leaves()[1].values, leaves[1][1])
             with self.assertRaisesRegex(frazil.Error, "holds booleans, but floats or vectors of floats are needed"):
-                frazil.load(ctx, theirs, "mask")
-            frazil.save(ctx, [back], ours)
+                frazil.load_grid(ctx, theirs, "mask")
+            frazil.save_grids(ctx, [back], ours)
             self.assertEqual(pyopenvdb.read(ours, "vel").vectorType, "contravariant relative")
 
 
@@ -972,7 +973,7 @@ class Words(unittest.TestCase):
             grid.transform = pyopenvdb.createLinearTransform(
                 [[0.05, 0, 0, 0], [0, 0.1, 0, 0], [0, 0, 0.05, 0], [0, 0, 0, 1]])
             pyopenvdb.write(path, grids=[grid])
-            flat = frazil.load(ctx, path)
+            flat = frazil.load_grid(ctx, path)
         for call in (lambda: frazil.level_set.offset(ctx, flat, 0.01), lambda: frazil.level_set.smooth(ctx, flat)):
             with self.assertRaises(frazil.Error) as caught:
                 call()
@@ -1061,7 +1062,7 @@ class Manners(unittest.TestCase):
 
         def poll(stage, done, seconds):
             try:
-                frazil.load(inner, "no.vdb")
+                frazil.load_grid(inner, "no.vdb")
             except frazil.Error as error:
                 seen.append(str(error))
 
@@ -1077,7 +1078,7 @@ class Manners(unittest.TestCase):
             if "body 0" in text:
                 raise LookupError(text)
             with self.assertRaises(frazil.Error):
-                frazil.load(inner, "no.vdb")
+                frazil.load_grid(inner, "no.vdb")
             said.append(text)
 
         said = []
@@ -1152,7 +1153,7 @@ class Manners(unittest.TestCase):
         with self.assertRaisesRegex(frazil.Error, "depth = -1"):
             frazil.snow_layer(ctx, depth=-1)
         with self.assertRaisesRegex(frazil.Error, "no.vdb: cannot read"):
-            frazil.load(ctx, "no.vdb")
+            frazil.load_grid(ctx, "no.vdb")
         with self.assertRaisesRegex(ValueError, "shape"):
             frazil.Mesh(ctx, np.zeros(5), [[0, 1, 2]])
         with self.assertRaisesRegex(frazil.Error, "belongs to another object"):
@@ -1160,7 +1161,9 @@ class Manners(unittest.TestCase):
         self.assertEqual(len(frazil.version()), 3)
 
 
-class Runs(unittest.TestCase):
+class OfScenes(unittest.TestCase):
+    """Tests of a scene file, in a folder of their own."""
+
     SCENE = """[shot]
 frames = "1-6"
 [snow]
@@ -1181,6 +1184,120 @@ cell = 0.01
         os.environ["FRAZIL_PROGRAM"] = str(library.parents[1] / "bin/frazil")
         self.addCleanup(os.environ.pop, "FRAZIL_PROGRAM")
 
+
+class Frames(OfScenes):
+    SCENE = OfScenes.SCENE.replace("1-6", "1-4") + """
+[grains]
+[mist]
+from_speed = 0.5
+[[object]]
+file = "box.ply"
+keys = [{ frame = 1, at = [0, 0.2, 0] }, { frame = 4, at = [0, 0.02, 0] }]
+[output]
+fog = ["base", "grains"]
+"""
+    BOX = ("ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n"
+           "element face 6\nproperty list uchar int vertex_indices\nend_header\n"
+           + "".join(f"{x} {y} {z}\n" for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1))
+           + "4 0 1 3 2\n4 4 6 7 5\n4 0 4 5 1\n4 2 3 7 6\n4 0 2 6 4\n4 1 5 7 3\n")
+
+    def setUp(self):
+        super().setUp()
+        (self.folder / "box.ply").write_text(self.BOX)
+
+    def assert_as_reported(self, frame):
+        """A frame's parts and grids are those that the reports of its stages list."""
+        found = {**frame.meshes, **frame.points}
+        reported = 0
+        for path in (frame.folder / "report").glob(f"*.{frame.number:04}.json"):
+            for kind, of_kind in json.loads(path.read_text()).get("contents", {}).items():
+                for name, held in of_kind.items():
+                    if "points" not in held:
+                        self.assertIn(name, frame.volumes[kind].grids)
+                        continue
+                    reported += 1
+                    part = found[f"{kind}/{name}"]
+                    self.assertEqual(len(part.positions), held["points"])
+                    self.assertEqual(len(part.face_counts), held.get("faces", 0))
+                    radii = 0 if part.radii is None else part.radii[:, None]
+                    low, high = (part.positions - radii).min(axis=0), (part.positions + radii).max(axis=0)
+                    np.testing.assert_allclose([low, high], held["extent_m"], atol=1e-6)
+        self.assertEqual(reported, len(found))
+
+    def test_a_frame_holds_what_its_reports_list(self):
+        frazil.run(self.scene, self.folder / "out")
+        shot = frazil.Shot(self.folder / "out")
+        self.assertEqual((shot.system, shot.fps, shot.first, shot.last, shot.frames()), ("snow", 24.0, 1, 4, [1, 2, 3, 4]))
+        frame = frazil.load(self.folder / "out", 3)
+        self.assertEqual((frame.number, frame.seconds, frame.system), (3, 2 / 24, "snow"))
+        self.assertEqual(set(frame.meshes), {"mesh/base", "objects/box"})
+        self.assert_as_reported(frame)
+        grains = frame.points["grains/grains"]
+        self.assertEqual((grains.velocities.shape, grains.ids.dtype), (grains.positions.shape, np.int64))
+        self.assertEqual(len(set(grains.ids.tolist())), len(grains.ids))
+        fall = frame.meshes["objects/box"].velocities
+        np.testing.assert_allclose(fall, np.broadcast_to([0, -0.06 * 24, 0], fall.shape), rtol=1e-4, atol=1e-6)
+        with frazil.Context(threads=1) as ctx:
+            surface = frame.volumes["base"].load(ctx, "surface")
+            self.assertEqual(surface.name, "surface")
+        self.assertEqual(set(frame.volumes["fog"].density_scale), {"base", "grains"})
+        self.assertTrue(all(scale > 0 for scale in frame.volumes["fog"].density_scale.values()))
+        # The arrays are lent: they keep the file's memory, and cannot be changed.
+        positions = grains.positions
+        del grains, frame
+        self.assertFalse(positions.flags.writeable)
+        self.assertTrue(np.isfinite(positions).all())
+
+    def test_a_frame_is_the_same_from_whichever_files_it_has(self):
+        # Mist and fog are made from grains in USD or VDB.
+        alone = self.SCENE.replace("[mist]\nfrom_speed = 0.5\n", "").replace('fog = ["base", "grains"]', "")
+        self.scene.write_text(alone)
+        outputs = {"usd": '["usd"]', "ply": '["ply"]', "vdb": '["vdb"]'}
+        frames = {}
+        for ending, wanted in outputs.items():
+            of_meshes = '["ply"]' if ending == "vdb" else wanted
+            settings = [f"output.grains={wanted}", f"output.mesh={of_meshes}", f"output.objects={of_meshes}"]
+            frazil.run(self.scene, self.folder / ending, settings=settings)
+            frames[ending] = frazil.load(self.folder / ending, 4)
+        usd = frames["usd"]
+        for other in (frames["ply"], frames["vdb"]):
+            np.testing.assert_array_equal(other.meshes["mesh/base"].positions, usd.meshes["mesh/base"].positions)
+            np.testing.assert_array_equal(other.meshes["objects/objects"].velocities, usd.meshes["objects/box"].velocities)
+            ours, theirs = (frame.points["grains/grains"] for frame in (other, usd))
+            self.assertEqual(set(ours.arrays), set(theirs.arrays))
+            by_id = [np.argsort(part.ids) for part in (ours, theirs)]
+            for name, array in ours.arrays.items():
+                values, wanted = array.values[by_id[0]], theirs.arrays[name].values[by_id[1]]
+                self.assertEqual((array.on, values.dtype), (theirs.arrays[name].on, wanted.dtype), name)
+                np.testing.assert_allclose(values, wanted, atol=2e-9, rtol=2e-7, err_msg=name)
+
+    def test_what_cannot_be_loaded_is_named(self):
+        settings = ['output.base_mode="delta"', 'output.grains_mode="delta"', 'output.grains=["vdb"]']
+        frazil.run(self.scene, self.folder / "out", settings=settings, frames="1-2")
+        with self.assertRaisesRegex(FileNotFoundError, "out: frame 3 is not made"):
+            frazil.load(self.folder / "out", 3)
+        with self.assertRaises(FileNotFoundError):
+            frazil.load(self.folder / "none", 1)
+        with self.assertRaisesRegex(ValueError, "grains.0002.vdb: it has only what changed"):
+            frazil.load(self.folder / "out", 2)
+        first = frazil.load(self.folder / "out", 1)
+        self.assertTrue(first.volumes["base"].is_whole)
+        (self.folder / "out/grains/grains.0001.vdb").write_bytes(b"cut")
+        with self.assertRaisesRegex(frazil.Error, "grains.0001.vdb"):
+            frazil.load(self.folder / "out", 1)
+        (self.folder / "scene.toml").write_text("[shot]\nframes = 3\n")
+        with self.assertRaisesRegex(ValueError, "scene.toml: it is not the scene that a run writes"):
+            frazil.Shot(self.folder)
+        with frazil.Context(threads=1) as ctx:
+            with self.assertRaisesRegex(frazil.Error, "none.ply"):
+                frazil.load_geometry(ctx, self.folder / "none.ply")
+            (mesh,) = frazil.load_geometry(ctx, self.folder / "box.ply")
+            self.assertEqual(mesh.face_counts.tolist(), [4] * 6)
+            with self.assertRaisesRegex(ValueError, "no triangles"):
+                mesh.triangles
+
+
+class Runs(OfScenes):
     def files(self, name):
         paths = (path for kind in ("base", "mesh") for path in (self.folder / name / kind).iterdir())
         return {path.name: path.read_bytes() for path in paths}
@@ -1203,6 +1320,35 @@ cell = 0.01
             frazil.run(self.scene, self.folder / "out", progress=lambda *_: 1 / 0)
         frazil.run(self.scene, self.folder / "out", wait=30)
         self.assertEqual(self.files("out"), self.files("whole"))
+
+    def test_a_run_can_be_ended_before_its_first_frame(self):
+        started, polls, done = time.monotonic(), [], []
+
+        def cancelled():
+            polls.append(time.monotonic() - started)
+            return len(polls) > 2
+
+        # A frame of such small cells takes seconds.
+        fine = {"settings": ["snow.cell=0.0006"], "stages": ["base"]}
+        with self.assertRaises(frazil.Cancelled):
+            frazil.run(self.scene, self.folder / "out", progress=lambda *frame: done.append(frame), cancelled=cancelled, **fine)
+        self.assertEqual(done, [])
+        self.assertEqual([round(2 * poll) for poll in polls[:3]], [0, 1, 2])
+        self.assertLess(time.monotonic() - started, 5)
+        with self.assertRaisesRegex(ZeroDivisionError, "division"):
+            frazil.run(self.scene, self.folder / "out", cancelled=lambda: 1 / 0)
+        # One that does not wish to end it changes nothing.
+        started = []
+        record = frazil.run(self.scene, self.folder / "whole", cancelled=lambda: False, started=started.append)
+        self.assertEqual(record["frames"], 12)
+        self.assertEqual(len(started), 1)
+        self.assertRaises(ProcessLookupError, os.kill, started[0], 0)
+
+    def test_a_preview_has_larger_cells(self):
+        frazil.run(self.scene, self.folder / "look", preview=2, frames="1")
+        self.assertIn("\ncell = 0.02 ", (self.folder / "look/scene.toml").read_text())
+        with self.assertRaisesRegex(frazil.RunError, "preview"):
+            frazil.run(self.scene, self.folder / "look", preview=0)
 
     def test_what_is_refused_says_why(self):
         for settings, status, why in (["snow.depth=-1"], 2, "depth"), (["snow.cell=1e-9"], 2, "cell"):

@@ -11,4 +11,6 @@ pub mod sample;
 
 pub mod bytes;
 
+pub mod listing;
+
 pub mod guarded;

@@ -5,7 +5,7 @@ use std::ffi::{CStr, c_char};
 use crate::capi::ffi::guard::last_error;
 
 /// Version of the interface that this header describes: major << 16 | minor.
-pub const FRZ_ABI_VERSION: u32 = 0x10008;
+pub const FRZ_ABI_VERSION: u32 = 0x10009;
 /// Major version of frazil that this header belongs to.
 pub const FRZ_VERSION_MAJOR: u32 = 0;
 /// Minor version of frazil.

@@ -9,7 +9,7 @@ pub(in crate::io) mod ply_write;
 mod stl;
 mod stl_solids;
 mod stl_text;
-mod usd;
+pub(in crate::io) mod usd;
 
 use std::path::Path;
 

@@ -24,6 +24,29 @@ pub(super) fn parse(bytes: &[u8], origin: [f64; 3]) -> Parsed<(PolygonMesh, Opti
     Ok(joined.finish())
 }
 
+/// A mesh of a file, with its prim's path and its constant colour.
+pub(in crate::io) type OneMesh = (String, Option<[f32; 3]>, PolygonMesh);
+
+/// Reads the meshes of a file one by one; none is not an error.
+pub(in crate::io) fn parse_each(bytes: &[u8]) -> Parsed<Vec<OneMesh>> {
+    let file = UsdFile::open(bytes)?;
+    if !file.has("Mesh") {
+        return Ok(Vec::new());
+    }
+    let one = |prim: &ReadPrim| {
+        let part = Part::read(&file, prim, DVec3::zeros());
+        let mut joined = Joined::default();
+        joined.add(part.map_err(|what| format!("{}: {what}", prim.path))?);
+        let color = match prim.attribute("primvars:displayColor") {
+            Some(attribute) if attribute.interpolation == "constant" => file.value(prim, &attribute.name)?,
+            _ => None,
+        };
+        let color = if let Some(Value::Vectors(colors)) = color { colors.first().copied() } else { None };
+        Ok((prim.path.clone(), color, joined.finish().0))
+    };
+    file.prims("Mesh", "mesh")?.into_iter().map(one).collect()
+}
+
 /// The mesh of one prim.
 #[derive(Default)]
 struct Part {

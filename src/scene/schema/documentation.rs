@@ -82,6 +82,92 @@ pub fn reference_of(keys: &[Key]) -> String {
     out.trim_start().to_string()
 }
 
+/// All keys with what they may hold, for programs that build an interface from them: an array of objects that all have the same fields.
+pub fn keys_json_of(keys: &[Key]) -> serde_json::Value {
+    let one = |key: &Key| {
+        let holds = Holds::of(key.kind);
+        let default = match key.fallback {
+            Fallback::Is(value) => as_json(value),
+            Fallback::Required | Fallback::Nothing | Fallback::Cells(_) => serde_json::Value::Null,
+        };
+        let cells = if let Fallback::Cells(cells) = key.fallback { Some(rounded(cells)) } else { None };
+        let presets = key.presets.iter().map(|(name, value)| ((*name).to_string(), as_json(value)));
+        serde_json::json!({
+            "table": key.table,
+            "is_table_array": is_table_array(key.table),
+            "is_optional_table": shared_keys::OPTIONAL_TABLES.contains(&key.table),
+            "name": key.name,
+            "kind": holds.kind,
+            "choices": holds.choices,
+            "min": holds.range.map(|(low, _)| low),
+            "max": holds.range.map(|(_, high)| high),
+            "count": holds.count,
+            "unit": holds.unit,
+            "extensions": holds.extensions,
+            "default": default,
+            "default_cells": cells,
+            "is_required": key.fallback == Fallback::Required,
+            "presets": presets.collect::<serde_json::Map<_, _>>(),
+            "of_characters": key.of_characters,
+            "meaning": key.meaning,
+        })
+    };
+    keys.iter().map(one).collect()
+}
+
+/// What a kind of key holds, field by field.
+#[derive(Default)]
+struct Holds {
+    kind: &'static str,
+    choices: Option<&'static [&'static str]>,
+    range: Option<(f64, f64)>,
+    count: Option<usize>,
+    unit: &'static str,
+    extensions: Option<&'static [&'static str]>,
+}
+
+impl Holds {
+    fn of(kind: Kind) -> Self {
+        let of = |kind| Self { kind, ..Self::default() };
+        let numbers = |limit: f64| Some((-limit, limit));
+        match kind {
+            Kind::Frames => of("frames"),
+            Kind::Flag => of("flag"),
+            Kind::Text => of("text"),
+            Kind::Choice(choices) => Self { choices: Some(choices), ..of("choice") },
+            Kind::Choices(choices) => Self { choices: Some(choices), ..of("choices") },
+            Kind::Number(low, high, unit) => Self { range: Some((low, high)), unit, ..of("number") },
+            Kind::Cells(low, high) => Self { range: Some((low, high)), unit: "m", ..of("cells") },
+            Kind::Whole(low, high) => Self { range: Some((low as f64, high as f64)), ..of("whole") },
+            Kind::Numbers(count, limit, unit) => {
+                Self { count: Some(count), range: numbers(limit), unit, ..of("numbers") }
+            }
+            Kind::File(extensions) => Self { extensions: Some(extensions), ..of("file") },
+            Kind::HeightOrFile(limit, extensions) => Self {
+                range: numbers(limit),
+                unit: "m",
+                extensions: Some(extensions),
+                ..of("height_or_file")
+            },
+            Kind::NumbersOrFile(count, limit, unit, extensions) => Self {
+                count: Some(count),
+                range: numbers(limit),
+                unit,
+                extensions: Some(extensions),
+                ..of("numbers_or_file")
+            },
+            Kind::Named(limit) => Self { range: numbers(limit), ..of("named") },
+            Kind::Poses(limit) => Self { range: numbers(limit), unit: "m", ..of("poses") },
+        }
+    }
+}
+
+/// A declared value as JSON; null if it is not valid TOML, which a test excludes.
+fn as_json(value: &str) -> serde_json::Value {
+    let table: Option<toml::Table> = format!("value = {value}").parse().ok();
+    table.and_then(|table| serde_json::to_value(table.get("value")?).ok()).unwrap_or_default()
+}
+
 /// The values that a key may have, with range and unit.
 fn allowed(key: &Key) -> String {
     let texts = |texts: &[&str], or: &str| {

@@ -18,6 +18,6 @@ pub use overrides::Override;
 pub use values::{Value, Values};
 
 pub(super) use crate::scene::schema::values::file_name;
-pub(super) use documentation::{reference_of, rounded, template_of};
+pub(super) use documentation::{keys_json_of, reference_of, rounded, template_of};
 pub(super) use shared_keys::{FAR, NO_ORIGIN, ORIGIN, ORIGIN_MEANS};
 pub(super) use toml_table::Table;

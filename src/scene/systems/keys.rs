@@ -4,7 +4,7 @@ use crate::scene::System;
 use crate::scene::schema::declaration::Key;
 use crate::scene::schema::declaration::OBJECT;
 use crate::scene::schema::shared_keys::{OBJECTS, OUTPUT, SHOT};
-use crate::scene::schema::{reference_of, template_of};
+use crate::scene::schema::{keys_json_of, reference_of, template_of};
 use crate::scene::shallow;
 use crate::scene::snow;
 use crate::scene::surface;
@@ -45,4 +45,11 @@ pub fn template(system: System) -> String {
 /// A table of a system's keys in Markdown: type, unit, range, default and meaning.
 pub fn reference(system: System) -> String {
     reference_of(of(system))
+}
+
+/// A system's keys as JSON: an array of objects with the fields `table`, `is_table_array` (any number of such tables), `is_optional_table`
+/// (a stage exists only with it), `name`, `kind`, `choices`, `min`, `max`, `count`, `unit`, `extensions`, `default`, `default_cells`,
+/// `is_required`, `presets`, `of_characters` and `meaning`. Those that do not apply are null or empty.
+pub fn keys_json(system: System) -> serde_json::Value {
+    keys_json_of(of(system))
 }

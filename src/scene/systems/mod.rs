@@ -6,7 +6,7 @@ mod resolved;
 mod take;
 mod typed;
 
-pub use keys::{reference, template};
+pub use keys::{keys_json, reference, template};
 pub use take::Take;
 
 #[cfg(test)]

@@ -285,6 +285,40 @@ fn the_docs_have_every_key_of_a_scene() {
     }
 }
 
+/// The keys of JSON are those of the table, and each says what its kind of value needs.
+#[test]
+fn keys_in_json_are_complete() {
+    let folder = Folder::empty();
+    for system in ["snow", "surface", "shallow"] {
+        let text = works(&folder, &format!("frazil new {system} --keys"));
+        let json = works(&folder, &format!("frazil new {system} --keys --json"));
+        let keys: Vec<serde_json::Value> = serde_json::from_str(&json).unwrap();
+        let rows = text.lines().filter(|line| line.starts_with("| `"));
+        let names: Vec<&str> = rows.map(|row| row.split('`').nth(1).unwrap()).collect();
+        assert_eq!(keys.iter().map(|key| key["name"].as_str().unwrap()).collect::<Vec<_>>(), names);
+        for key in &keys {
+            let has = |name: &str| !key[name].is_null();
+            let kind = key["kind"].as_str().unwrap();
+            assert_eq!(has("choices"), kind.starts_with("choice"), "{key}");
+            assert_eq!(has("extensions"), kind.ends_with("file"), "{key}");
+            assert_eq!(has("count"), kind.starts_with("numbers"), "{key}");
+            assert_eq!(has("min"), has("max"), "{key}");
+            assert!(!(key["is_required"] == true && has("default")), "{key}");
+        }
+        // Defaults are values, not texts of them; so are those of presets.
+        let default = |name: &str| keys.iter().find(|key| key["name"] == name).unwrap()["default"].clone();
+        assert_eq!((default("fps"), default("usd")), (24.0.into(), true.into()));
+    }
+    let keys: serde_json::Value =
+        serde_json::from_str(&works(&folder, "frazil new snow --keys --json")).unwrap();
+    let air = keys.as_array().unwrap().iter().find(|key| key["name"] == "air").unwrap();
+    assert_eq!(air["presets"], serde_json::json!({ "powder": 0.3, "wet": 0.8 }));
+    assert_eq!(
+        (&air["min"], &air["max"], &air["is_optional_table"]),
+        (&0.0.into(), &1.0.into(), &true.into())
+    );
+}
+
 #[test]
 fn the_page_of_surface_runs_and_has_every_key() {
     let folder = &Folder::empty();

@@ -1,0 +1,166 @@
+"""What a shot made: the arrays and grids of a frame, from whichever files it has."""
+
+import json
+import pathlib
+import re
+from typing import NamedTuple
+
+from .context import Context
+from .geometry import load_geometry
+from .grid import list_grids, load_grid
+
+# By preference: USD has the names of objects and their colours.
+_ENDINGS = (".usdc", ".ply", ".obj", ".vdb")
+# Folders of a shot that hold volumes.
+_VOLUMES = ("base", "removed", "mist", "fog", "snow", "volume")
+_FRAME = re.compile(r"\.(-?\d+)\.[a-z]+$")
+
+
+class Volume(NamedTuple):
+    """The .vdb file of a frame.
+
+    path: pathlib.Path
+    grids: names of its grids
+    density_scale: a dict from names of grids to the extinction (1/m) of a density of 1, for those that state it
+    is_whole: False if the file has only what changed since the frame before (`base_mode = "delta"`); `frazil vdb rebuild` makes it whole"""
+
+    path: pathlib.Path
+    grids: list
+    density_scale: dict
+    is_whole: bool
+
+    def load(self, ctx, name):
+        """A grid: frazil.Grid, of floats or vectors. Raises frazil.Error for a file that is damaged, ValueError for one that is not whole."""
+        if not self.is_whole:
+            raise ValueError(f"{self.path}: it has only what changed since the frame before: `frazil vdb rebuild` makes whole files")
+        return load_grid(ctx, self.path, name)
+
+
+class Frame(NamedTuple):
+    """A frame of a shot; everything in metres and seconds, Y up.
+
+    folder: pathlib.Path of the shot
+    number: of the frame
+    fps: frames per second
+    seconds: since the shot's first frame
+    system: "snow", "surface" or "shallow"
+    meshes: a dict from "KIND/NAME" to Part: "mesh/base", "objects/NAME", "surface/surface", "liquid/liquid", "terrain/terrain", "obstacles/NAME"
+    points: a dict from "KIND/NAME" to Part: "grains/grains"
+    volumes: a dict from "base", "removed", "mist", "fog", "snow" and "volume" to Volume
+
+    Kinds of which the frame has no file are left out."""
+
+    folder: pathlib.Path
+    number: int
+    fps: float
+    seconds: float
+    system: str
+    meshes: dict
+    points: dict
+    volumes: dict
+
+
+class Shot:
+    """The folder of a shot: `frazil.run(scene, folder)` made it.
+
+    folder: pathlib.Path; system: "snow", "surface" or "shallow"; fps: frames per second; first, last: frames of the scene.
+    Raises FileNotFoundError for a folder without scene.toml, ValueError if that is not of a shot."""
+
+    def __init__(self, folder):
+        self.folder = pathlib.Path(folder)
+        # The program writes it with all defaults, one key a line.
+        text = (self.folder / "scene.toml").read_text(encoding="utf-8")
+        self._settings = _settings(text)
+        systems = [name for name in ("snow", "surface", "shallow") if f"\n[{name}]" in "\n" + text]
+        frames = re.fullmatch(r'"(-?\d+)-(-?\d+)"', self._settings.get("shot.frames", ""))
+        if len(systems) != 1 or frames is None or "shot.fps" not in self._settings:
+            raise ValueError(f"{self.folder / 'scene.toml'}: it is not the scene that a run writes")
+        self.system = systems[0]
+        self.fps = float(self._settings["shot.fps"])
+        self.first, self.last = map(int, frames.groups())
+
+    def __repr__(self):
+        return f"<frazil.Shot {self.system} {self.first}-{self.last} in {self.folder}>"
+
+    def frames(self):
+        """The frames that were made, ascending: those of which at least one stage is done."""
+        return sorted({number for number, _ in self._records()})
+
+    def _records(self):
+        """The number of the frame and the path of each record of a stage's frame."""
+        for path in (self.folder / "state").glob("*.json"):
+            number = _FRAME.search(path.name)
+            if number:
+                yield int(number[1]), path
+
+    def load(self, number):
+        """A frame: see frazil.load."""
+        records = [json.loads(path.read_text(encoding="utf-8"))["content"] for frame, path in self._records() if frame == number]
+        if not records:
+            raise FileNotFoundError(f"{self.folder}: frame {number} is not made")
+        by_kind = {}
+        for record in records:
+            for file in record["files"]:
+                path = pathlib.PurePosixPath(file["path"])
+                by_kind.setdefault(path.parts[0], {})[path.suffix] = self.folder / path
+        still = self.folder / "surroundings.usdc"
+        if still.is_file():
+            by_kind["surroundings"] = {".usdc": still}
+        out = Frame(self.folder, number, self.fps, (number - self.first) / self.fps, self.system, {}, {}, {})
+        with Context() as ctx:
+            for kind, files in by_kind.items():
+                if kind in _VOLUMES:
+                    self._add_volume(ctx, out, kind, files[".vdb"])
+                else:
+                    self._add_parts(ctx, out, kind, files)
+        return out
+
+    def _add_volume(self, ctx, frame, kind, path):
+        grids = list_grids(ctx, path)
+        scales = {grid.name: grid.density_scale for grid in grids if grid.density_scale is not None}
+        is_whole = kind != "base" or self._settings.get("output.base_mode") != '"delta"' or frame.number == self.first
+        frame.volumes[kind] = Volume(path, [grid.name for grid in grids], scales, is_whole)
+
+    def _add_parts(self, ctx, frame, kind, files):
+        endings = [ending for ending in _ENDINGS if ending in files]
+        if not endings:
+            return
+        if endings[0] == ".vdb" and self._settings.get("output.grains_mode") == '"delta"' and (frame.number - self.first) % 24:
+            raise ValueError(f"{files['.vdb']}: it has only what changed since the frame before: "
+                             f"`frazil vdb rebuild --stage grains` makes whole files")
+        for part in load_geometry(ctx, files[endings[0]]):
+            of = frame.points if kind == "grains" else frame.meshes
+            of[_key(kind, part.name)] = part
+
+
+def _key(kind, name):
+    """The key of a part: its prim's path below the shot; other files than USD have one part, without a name."""
+    names = name.strip("/").split("/")
+    if kind != "surroundings":
+        names = [kind, *names[-1:]] if names[-1] else [kind, "base" if kind == "mesh" else kind]
+    return "/".join(names[-2:] if len(names) > 1 else names * 2)
+
+
+def _settings(text):
+    """The values of a scene that a run wrote, as TOML, by table and key; those of [[tables]] are left out."""
+    out, table = {}, None
+    for line in text.splitlines():
+        heading = re.match(r"\s*\[(\[?)([a-z_.]+)\]", line)
+        if heading:
+            table = None if heading[1] else heading[2]
+        found = re.match(r'([a-z_]+) = ("[^"]*"|[^#]*?)\s*(#.*)?$', line)
+        if found and table:
+            out[f"{table}.{found[1]}"] = found[2]
+    return out
+
+
+def load(folder, number):
+    """What a made frame of a shot holds: a Frame, with arrays of its meshes and points, and its volumes.
+
+    folder: the shot's, as given to frazil.run or `frazil snow -o`
+    number: of the frame
+
+    Meshes and points are read from .usdc files or, where there are none, from .ply, .obj or .vdb, with the same result. Grids are read when
+    Volume.load is called. Raises FileNotFoundError for a frame that is not made or a folder that no run made, frazil.Error for a file that is
+    missing or damaged."""
+    return Shot(folder).load(number)
