@@ -7,6 +7,7 @@ mod common;
 #[path = "harness.rs"]
 mod harness;
 mod house;
+mod packages;
 mod plots;
 mod process;
 mod reliability;
@@ -120,5 +121,6 @@ fn main() {
     surface::detail_kept::run(&mut h);
     h.measure("house.circles", house::circles);
     shots::run(&mut h);
+    packages::run(&mut h);
     h.finish();
 }

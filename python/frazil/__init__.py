@@ -32,11 +32,16 @@ the one that the system's loader finds.
     frame = frazil.load("cache/", 48)                       # what a frame holds
     frame.meshes["mesh/base"].positions, frame.points["grains/grains"].velocities, frame.volumes["mist"].grids
 
-Lengths are metres, times seconds; Y is up. A call that fails raises frazil.Error with one sentence.
-Handles have close(), and can be used in with blocks.
+Lengths are metres, times seconds; Y is up. Arrays that are given may be of any type that NumPy converts; those of the type that a docstring names,
+C-contiguous, are read where they are. Arrays that are returned are copies unless their docstring says that they are lent.
+
+A call that fails raises frazil.Error with one sentence, and changes nothing; ValueError if an array has the wrong shape or a handle is closed;
+NotImplementedError if the library lacks what it needs (the core library is without OpenVDB). Handles have close(), and can be used in with blocks.
 """
 
 from ._library import ABI_VERSION, Error, library, version
+from .alembic import write_alembic
+from .alembic_read import read_alembic
 from .context import Context, Pool
 from .grains import Grains
 from .frames import Frame, Shot, Volume, load
@@ -45,8 +50,10 @@ from .grid import Grid, Leaf, list_grids, load_grid, save_grids
 from .mesh import Mesh
 from .mist import Mist
 from .runs import Cancelled, RunError, program, run
-from .shallow import (Absorber, Ball, Box, Capsule, Drain, Drops, Orifice, Scalar, Shallow, Snapshot, Source, Surface)
+from .shallow import Shallow, Snapshot
 from .shallow_detail import ShallowDetail
+from .shallow_given import Absorber, Ball, Box, Capsule, Drain, Orifice, Scalar, Source
+from .shallow_meshes import Drops, Surface
 from .shallow_stains import Stains
 from .snow import Base, Body, Noise, snow_layer
 from .tracker import Particles, Tracker, spacing
@@ -56,6 +63,6 @@ __all__ = [
     "ABI_VERSION", "Absorber", "Array", "Ball", "Base", "Body", "Box", "Cancelled", "Capsule", "Context", "Drain", "Drops",
     "Error", "Frame", "Grains", "Grid", "Leaf", "Mesh", "Mist", "Noise", "Orifice", "Part", "Particles", "Pool", "RunError",
     "Scalar", "Shallow", "ShallowDetail", "Shot", "Snapshot", "Source", "Stains", "Surface", "Tracker", "Volume", "level_set",
-    "library", "list_grids", "load", "load_geometry", "load_grid", "program", "run", "save_grids", "snow_layer", "spacing",
-    "version",
+    "library", "list_grids", "load", "load_geometry", "load_grid", "program", "read_alembic", "run", "save_grids", "snow_layer",
+    "spacing", "version", "write_alembic",
 ]

@@ -1,13 +1,16 @@
 """What a shot made: the arrays and grids of a frame, from whichever files it has."""
 
+from __future__ import annotations
+
 import json
+import os
 import pathlib
 import re
-from typing import NamedTuple
+from typing import Any, Dict, Iterator, List, NamedTuple
 
 from .context import Context
-from .geometry import load_geometry
-from .grid import list_grids, load_grid
+from .geometry import Part, load_geometry
+from .grid import Grid, list_grids, load_grid
 
 # By preference: USD has the names of objects and their colours.
 _ENDINGS = (".usdc", ".ply", ".obj", ".vdb")
@@ -25,12 +28,13 @@ class Volume(NamedTuple):
     is_whole: False if the file has only what changed since the frame before (`base_mode = "delta"`); `frazil vdb rebuild` makes it whole"""
 
     path: pathlib.Path
-    grids: list
-    density_scale: dict
+    grids: List[str]
+    density_scale: Dict[str, float]
     is_whole: bool
 
-    def load(self, ctx, name):
-        """A grid: frazil.Grid, of floats or vectors. Raises frazil.Error for a file that is damaged, ValueError for one that is not whole."""
+    def load(self, ctx: Context, name: str) -> Grid:
+        """Reads one of the grids, of floats or vectors. Raises frazil.Error for a file that is missing or damaged or has no such grid, ValueError for
+        one that is not whole."""
         if not self.is_whole:
             raise ValueError(f"{self.path}: it has only what changed since the frame before: `frazil vdb rebuild` makes whole files")
         return load_grid(ctx, self.path, name)
@@ -55,9 +59,9 @@ class Frame(NamedTuple):
     fps: float
     seconds: float
     system: str
-    meshes: dict
-    points: dict
-    volumes: dict
+    meshes: Dict[str, Part]
+    points: Dict[str, Part]
+    volumes: Dict[str, Volume]
 
 
 class Shot:
@@ -66,7 +70,13 @@ class Shot:
     folder: pathlib.Path; system: "snow", "surface" or "shallow"; fps: frames per second; first, last: frames of the scene.
     Raises FileNotFoundError for a folder without scene.toml, ValueError if that is not of a shot."""
 
-    def __init__(self, folder):
+    folder: pathlib.Path
+    system: str
+    fps: float
+    first: int
+    last: int
+
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
         self.folder = pathlib.Path(folder)
         # The program writes it with all defaults, one key a line.
         text = (self.folder / "scene.toml").read_text(encoding="utf-8")
@@ -79,26 +89,26 @@ class Shot:
         self.fps = float(self._settings["shot.fps"])
         self.first, self.last = map(int, frames.groups())
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<frazil.Shot {self.system} {self.first}-{self.last} in {self.folder}>"
 
-    def frames(self):
+    def frames(self) -> list[int]:
         """The frames that were made, ascending: those of which at least one stage is done."""
         return sorted({number for number, _ in self._records()})
 
-    def _records(self):
+    def _records(self) -> Iterator[tuple[int, pathlib.Path]]:
         """The number of the frame and the path of each record of a stage's frame."""
         for path in (self.folder / "state").glob("*.json"):
             number = _FRAME.search(path.name)
             if number:
                 yield int(number[1]), path
 
-    def load(self, number):
+    def load(self, number: int) -> Frame:
         """A frame: see frazil.load."""
         records = [json.loads(path.read_text(encoding="utf-8"))["content"] for frame, path in self._records() if frame == number]
         if not records:
             raise FileNotFoundError(f"{self.folder}: frame {number} is not made")
-        by_kind = {}
+        by_kind: dict[str, dict[str, pathlib.Path]] = {}
         for record in records:
             for file in record["files"]:
                 path = pathlib.PurePosixPath(file["path"])
@@ -115,13 +125,13 @@ class Shot:
                     self._add_parts(ctx, out, kind, files)
         return out
 
-    def _add_volume(self, ctx, frame, kind, path):
+    def _add_volume(self, ctx: Context, frame: Frame, kind: str, path: pathlib.Path) -> None:
         grids = list_grids(ctx, path)
         scales = {grid.name: grid.density_scale for grid in grids if grid.density_scale is not None}
         is_whole = kind != "base" or self._settings.get("output.base_mode") != '"delta"' or frame.number == self.first
         frame.volumes[kind] = Volume(path, [grid.name for grid in grids], scales, is_whole)
 
-    def _add_parts(self, ctx, frame, kind, files):
+    def _add_parts(self, ctx: Context, frame: Frame, kind: str, files: dict[str, pathlib.Path]) -> None:
         endings = [ending for ending in _ENDINGS if ending in files]
         if not endings:
             return
@@ -133,7 +143,7 @@ class Shot:
             of[_key(kind, part.name)] = part
 
 
-def _key(kind, name):
+def _key(kind: str, name: str) -> str:
     """The key of a part: its prim's path below the shot; other files than USD have one part, without a name."""
     names = name.strip("/").split("/")
     if kind != "surroundings":
@@ -141,9 +151,10 @@ def _key(kind, name):
     return "/".join(names[-2:] if len(names) > 1 else names * 2)
 
 
-def _settings(text):
+def _settings(text: str) -> dict[str, str]:
     """The values of a scene that a run wrote, as TOML, by table and key; those of [[tables]] are left out."""
-    out, table = {}, None
+    out: dict[str, str] = {}
+    table: str | None = None
     for line in text.splitlines():
         heading = re.match(r"\s*\[(\[?)([a-z_.]+)\]", line)
         if heading:
@@ -154,7 +165,7 @@ def _settings(text):
     return out
 
 
-def load(folder, number):
+def load(folder: str | os.PathLike[str], number: int) -> Frame:
     """What a made frame of a shot holds: a Frame, with arrays of its meshes and points, and its volumes.
 
     folder: the shot's, as given to frazil.run or `frazil snow -o`

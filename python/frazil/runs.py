@@ -1,5 +1,7 @@
 """The program, from Python: a shot is made in a process of its own, which tells its progress, can be ended and resumes."""
 
+from __future__ import annotations
+
 import contextlib
 import json
 import logging
@@ -13,6 +15,7 @@ import sys
 import tempfile
 import threading
 import time
+from typing import IO, Any, Callable, Generator, Iterable, cast
 
 _log = logging.getLogger("frazil")
 # A table or a key that only the scenes of one system have.
@@ -27,7 +30,7 @@ class RunError(RuntimeError):
     status: exit code: 1 = a frame could not be made, 2 = the scene, an option or an input was refused, 75 = another run writes into the folder;
     negative: the signal that ended it."""
 
-    def __init__(self, status, message):
+    def __init__(self, status: int, message: str) -> None:
         super().__init__(message or f"the program ended with exit code {status}")
         self.status = status
 
@@ -36,7 +39,7 @@ class Cancelled(RunError):
     """A run that `progress` or `cancelled` ended. The frames that are done remain, and the same run resumes after them."""
 
 
-def program():
+def program() -> str:
     """The path of the program: that in FRAZIL_PROGRAM, else that of this package, of the installed tree, or on the PATH.
 
     Raises FileNotFoundError if there is none."""
@@ -45,36 +48,38 @@ def program():
         return named
     here = pathlib.Path(__file__).resolve()
     # The second: PREFIX/share/frazil/python/frazil/runs.py and PREFIX/bin/frazil
-    near = [folder / "bin" / "frazil" for folder in (here.parent, *here.parents[4:5])]
+    near = [folder / "bin" / "frazil" for folder in (here.parent, *list(here.parents)[4:5])]
     found = next((str(path) for path in near if path.is_file()), None) or shutil.which("frazil")
     if found is None:
         raise FileNotFoundError("the program frazil was not found: set FRAZIL_PROGRAM to its path, or put it on the PATH")
     return found
 
 
-def main():
+def main() -> None:
     """Becomes the program, with this process's arguments: the command of an installed wheel."""
     path = program()
     os.execv(path, [path, *sys.argv[1:]])
 
 
-def system(scene):
+def system(scene: str | os.PathLike[str]) -> str:
     """The system of a scene file: "snow", "surface" or "shallow".
 
     Raises ValueError if it is not of one system, OSError if it cannot be read."""
-    found = sorted(set(_OF_SYSTEM.findall(pathlib.Path(scene).read_text(encoding="utf-8"))))
+    found: list[str] = sorted(set(_OF_SYSTEM.findall(pathlib.Path(scene).read_text(encoding="utf-8"))))
     if len(found) != 1:
         raise ValueError(f"{scene}: it must have one of the tables [snow], [surface] and [shallow], and has {' and '.join(found) or 'none'}")
     return found[0]
 
 
-def run(scene, output, *, progress=None, cancelled=None, started=None, settings=(), stages=(), frames=None, from_frame=None, preview=None,
-        threads=None, wait=0.0):
+def run(scene: str | os.PathLike[str], output: str | os.PathLike[str], *, progress: Callable[[str, int, float, float], object] | None = None,
+        cancelled: Callable[[], object] | None = None, started: Callable[[int], object] | None = None, settings: Iterable[str] = (),
+        stages: Iterable[str] = (), frames: str | None = None, from_frame: int | None = None, preview: int | None = None,
+        threads: int | None = None, wait: float = 0.0) -> dict[str, Any]:
     """Makes the shot of a scene file in a folder, and returns the run's record: a dict as of `--report`. Frames that exist and match are not
     made again: a run that was ended resumes.
 
-    progress: called after each frame as progress(stage, frame, fraction, seconds_left), with the fraction of the time (0 to 1); if it returns
-        False, the run is ended
+    progress: called after each frame as progress(stage, frame, fraction, seconds_left), with the fraction of the time (0 to 1) and the
+        estimated time that is left (s); if it returns False, the run is ended
     cancelled: called twice a second, from the start and between frames; if it returns True, the run is ended. Like `progress`, it is called
         in the thread that called run()
     started: called once, with the id of the program's process, as soon as it runs
@@ -98,20 +103,22 @@ def run(scene, output, *, progress=None, cancelled=None, started=None, settings=
         status, message, is_cancelled = _watched(command, progress, cancelled, started)
         if status != 0:
             raise (Cancelled if is_cancelled else RunError)(status, message)
-        return json.loads(record.read_text(encoding="utf-8"))
+        return cast("dict[str, Any]", json.loads(record.read_text(encoding="utf-8")))
 
 
-def _watched(command, progress, cancelled, started):
+def _watched(command: list[str], progress: Callable[[str, int, float, float], object] | None, cancelled: Callable[[], object] | None,
+             started: Callable[[int], object] | None) -> tuple[int, str, bool]:
     """Runs the program; returns its exit code, its error message, and whether `progress` or `cancelled` ended it."""
-    errors, is_cancelled = [], False
+    errors: list[str] = []
+    is_cancelled = False
     process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
                                encoding="utf-8", errors="replace")
-    with process, contextlib.closing(_lines(process.stderr)) as lines:
+    with process, contextlib.closing(_lines(cast("IO[str]", process.stderr))) as lines:
         try:
             if started is not None:
                 started(process.pid)
             for line in lines:
-                wants_end = False
+                wants_end: object = False
                 if line is None:
                     wants_end = cancelled is not None and cancelled()
                 elif done := _finished_frame(line):
@@ -127,11 +134,11 @@ def _watched(command, progress, cancelled, started):
     return process.returncode, "\n".join(errors), is_cancelled
 
 
-def _lines(stream):
+def _lines(stream: IO[str]) -> Generator[str | None, None, None]:
     """The lines of a stream as they come, and None at the start and every `_POLL` seconds, however many lines come."""
-    lines = queue.SimpleQueue()
+    lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
 
-    def read():
+    def read() -> None:
         for line in stream:
             lines.put(line)
         lines.put(None)
@@ -157,7 +164,7 @@ def _lines(stream):
         reader.join()
 
 
-def _logged(line):
+def _logged(line: str) -> bool:
     """Passes a warning or note of the program to the logger; returns whether the line was one."""
     for level, name in ((logging.WARNING, "warn"), (logging.INFO, "info"), (logging.DEBUG, "debug")):
         prefix = f"frazil: {name}: "
@@ -167,7 +174,7 @@ def _logged(line):
     return False
 
 
-def _finished_frame(line):
+def _finished_frame(line: str) -> tuple[str, int, float, float] | None:
     """Stage, frame, fraction and seconds left of a line of progress; None for other lines."""
     if not line.startswith("{"):
         return None

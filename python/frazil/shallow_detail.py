@@ -1,13 +1,23 @@
 """Shallow liquid in cells of two sizes: small ones near what matters."""
 
+from __future__ import annotations
+
 import ctypes as c
+from typing import TYPE_CHECKING, Any, Sequence
 
 import numpy as np
 
-from ._library import (Handle, ShallowBalance, ShallowBody, ShallowFlow, ShallowMoved, ShallowReport, ShallowScalarBalance, View, call, made, rows, saved, view)
+from ._library import Handle, Numbers, call, made, rows, saved, view
+from ._structs import ShallowBalance, ShallowBody, ShallowFlow, ShallowMoved, ShallowReport, ShallowScalarBalance, View
+from .context import Context
 from .mesh import Mesh
-from .shallow import Shallow, _body, _flow, domain_of, scalars_of
-from .shallow_meshes import surface_of
+from .shallow import Shallow
+from .shallow_given import Flow, Scalar, ShallowFirst, ShallowMore, Solid, body_of, domain_of, flow_of, scalars_of
+from .shallow_meshes import Surface, SurfacePart, surface_of
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    from typing_extensions import Unpack
 
 
 class ShallowDetail(Handle):
@@ -17,9 +27,13 @@ class ShallowDetail(Handle):
     near: (x0, z0, x1, z1), the box of small cells (m), enlarged to whole pairs of cells. The numbers of cells along x and z must be even.
     """
 
+    cells: tuple[int, int]
+    origin: tuple[float, float]
+
     _destroy = "frz_shallow_detail_destroy"
 
-    def __init__(self, ctx, ground, cell, near, origin=None, cells=None, low=None, high=None, **more):
+    def __init__(self, ctx: Context, ground: Mesh | npt.ArrayLike, cell: float, near: Numbers, origin: Sequence[float] | None = None,
+                 cells: Sequence[int] | None = None, low: float | None = None, high: float | None = None, **more: Unpack[ShallowFirst]) -> None:
         params = Shallow._params(**more)
         heights, domain = domain_of(ground, cell, origin, cells, low, high)
         start, behind = (ctx.pointer, c.byref(params), c.byref(domain)), (c.c_double * 4)(*near)
@@ -30,114 +44,118 @@ class ShallowDetail(Handle):
         else:
             raise ValueError("liquid in cells of two sizes needs a mesh or heights")
         super().__init__(pointer)
-        self._ctx, self._more, self._scalars = ctx, more, 0
+        self._ctx, self._scalars = ctx, 0
+        self._more: dict[str, Any] = {**more}
         self.cells, self.origin = tuple(domain.cells), tuple(domain.origin)
 
-    def _words(self):
+    def _words(self) -> str:
         return f"on {self.cells[0]} x {self.cells[1]} cells"
 
-    def set_params(self, **more):
+    def set_params(self, **more: Unpack[ShallowMore]) -> None:
         """As Shallow.set_params."""
-        more = self._more | more
-        call("shallow_detail_set_params", self.pointer, c.byref(Shallow._params(**more)))
-        self._more = more
+        wanted = {**self._more, **more}
+        call("shallow_detail_set_params", self.pointer, c.byref(Shallow._params(**wanted)))
+        self._more = wanted
 
     @property
-    def near(self):
+    def near(self) -> tuple[float, float, float, float]:
         """The box of small cells: (x0, z0, x1, z1) (m). Moving the box does not change the liquid's volume."""
-        out = (c.c_double * 4)()
+        out: Any = (c.c_double * 4)()
         call("shallow_detail_get_near", self.pointer, out)
         return tuple(out)
 
     @near.setter
-    def near(self, near):
+    def near(self, near: Numbers) -> None:
         call("shallow_detail_set_near", self.pointer, (c.c_double * 4)(*near))
 
-    def step(self, dt):
-        """Computes a frame of dt seconds. Returns a report (frz_shallow_report)."""
+    def step(self, dt: float) -> ShallowReport:
+        """Computes a frame of dt seconds, and returns a report. After a failure or a cancel the liquid is as it was."""
         report = ShallowReport(c.sizeof(ShallowReport))
         call("shallow_detail_step", self._ctx.pointer, self.pointer, dt, c.byref(report))
         return report
 
-    def set_flows(self, flows):
+    def set_flows(self, flows: Sequence[Flow]) -> None:
         """As Shallow.set_flows; each flow point acts on cells of the size at its centre."""
-        array = (ShallowFlow * max(len(flows), 1))(*(_flow(flow) for flow in flows))
+        array = (ShallowFlow * max(len(flows), 1))(*(flow_of(flow) for flow in flows))
         call("shallow_detail_set_flows", self.pointer, array, len(flows))
 
-    def set_rate(self, flow, rate):
-        """Changes the rate (m3/s) of a flow point."""
+    def set_rate(self, flow: int, rate: float) -> None:
+        """Changes the rate (m3/s), 0 or more, of a flow point, by its index in set_flows(). The volume that it has moved stays."""
         call("shallow_detail_set_rate", self.pointer, flow, rate)
 
-    def moved(self, flow):
-        """The volume (m3) that entered or left through a flow point since it was set."""
+    def moved(self, flow: int) -> float:
+        """As Shallow.moved."""
         out = c.c_double()
         call("shallow_detail_flow_moved", self.pointer, flow, c.byref(out))
         return out.value
 
-    def pour(self, at, volume, radius=0.0):
-        """Pours in a volume (m3; negative: takes it out) around a position (m). Returns the volume that was poured in (negative: taken out)."""
+    def pour(self, at: Numbers, volume: float, radius: float = 0.0) -> float:
+        """As Shallow.pour, into cells of the size at the position."""
         out = c.c_double()
         call("shallow_detail_pour", self.pointer, (c.c_double * 3)(*at), radius, volume, c.byref(out))
         return out.value
 
-    def fill(self, height):
-        """Fills all columns up to a height (m), or to their ceiling."""
+    def fill(self, height: float) -> None:
+        """As Shallow.fill."""
         call("shallow_detail_fill", self.pointer, height)
 
-    def set_scalars(self, scalars):
+    def set_scalars(self, scalars: Sequence[Scalar]) -> None:
         """As Shallow.set_scalars."""
         call("shallow_detail_set_scalars", self.pointer, scalars_of(scalars), len(scalars))
         self._scalars = len(scalars)
 
-    def set_poured(self, concentrations):
-        """Sets the concentration of each scalar in liquid that pour() and fill() add from now on."""
+    def set_poured(self, concentrations: npt.ArrayLike) -> None:
+        """As Shallow.set_poured, for pour() and fill()."""
         call("shallow_detail_set_poured", self.pointer, view(np.ascontiguousarray(concentrations, np.float64)))
 
-    def set_sourced(self, flow, concentrations):
-        """Sets the concentration of each scalar in liquid from a Source; set_flows() sets them to 0."""
+    def set_sourced(self, flow: int, concentrations: npt.ArrayLike) -> None:
+        """As Shallow.set_sourced."""
         call("shallow_detail_set_sourced", self.pointer, flow, view(np.ascontiguousarray(concentrations, np.float64)))
 
-    def scalar_balance(self, scalar):
-        """Where all of a scalar is (its own unit x m3): see frz_shallow_scalar_balance."""
+    def scalar_balance(self, scalar: int) -> ShallowScalarBalance:
+        """As Shallow.scalar_balance."""
         out = ShallowScalarBalance(c.sizeof(ShallowScalarBalance))
         call("shallow_detail_get_scalar_balance", self.pointer, scalar, c.byref(out))
         return out
 
     @property
-    def balance(self):
-        """Where all liquid is (m3): see frz_shallow_balance."""
+    def balance(self) -> ShallowBalance:
+        """Where all liquid is and came from (m3)."""
         out = ShallowBalance(c.sizeof(ShallowBalance))
         call("shallow_detail_get_balance", self.pointer, c.byref(out))
         return out
 
-    def update_terrain(self, positions):
-        """Moves the vertices (n, 3) of the mesh. Returns a report (frz_shallow_moved)."""
+    def update_terrain(self, positions: npt.ArrayLike) -> ShallowMoved:
+        """Moves the vertices of the mesh: positions, (n, 3) float32 (m), finite, in the mesh's order. Returns a report. Raises ValueError for another
+        shape."""
         return self._move("update_terrain", view(rows(positions, np.float32, 3)))
 
-    def update_heights(self, heights):
-        """Changes the heights (nz, nx) of the height field; the report is that of update_terrain."""
+    def update_heights(self, heights: npt.ArrayLike) -> ShallowMoved:
+        """Changes the heights, (nz, nx) float32 (m), of the height field; the report is that of update_terrain."""
         return self._move("update_heights", view(np.ascontiguousarray(heights, np.float32).reshape(-1)))
 
-    def set_bodies(self, bodies):
-        """Sets Balls, Capsules and Boxes that move over the ground, replacing the previous ones; the report is that of update_terrain."""
-        array = (ShallowBody * max(len(bodies), 1))(*(_body(body) for body in bodies))
+    def set_bodies(self, bodies: Sequence[Solid]) -> ShallowMoved:
+        """Sets Balls, Capsules and Boxes that move over the ground, replacing the previous ones: keep each at the same index. The report is that of
+        update_terrain."""
+        array = (ShallowBody * max(len(bodies), 1))(*(body_of(body) for body in bodies))
         return self._move("set_bodies", array, len(bodies))
 
-    def _move(self, name, *given):
+    def _move(self, name: str, *given: Any) -> ShallowMoved:
         moved = ShallowMoved(c.sizeof(ShallowMoved))
         call("shallow_detail_" + name, self._ctx.pointer, self.pointer, *given, c.byref(moved))
         return moved
 
-    def surface(self, parts=(), z_up=False, left_handed=False, scale=1.0, least_depth=0.0, opaque_depth=0.01, fade_depth=0.0):
-        """The Surface of all liquid, one mesh over cells of both sizes, with its scalars and the requested parts: normals, depths, opacities, velocities,
-        layers, columns."""
+    def surface(self, parts: Sequence[SurfacePart] = (), z_up: bool = False, left_handed: bool = False, scale: float = 1.0, least_depth: float = 0.0,
+                opaque_depth: float = 0.01, fade_depth: float = 0.0) -> Surface:
+        """The surface of all liquid, one mesh over cells of both sizes, with its scalars; arguments as in Shallow.surface. In `columns` the
+        indices of large cells follow those of small ones."""
         return surface_of("shallow_detail_surface", self._ctx, self.pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth, False,
                           fade_depth, False, self._scalars)
 
-    def save(self):
+    def save(self) -> bytes:
         """The state between two frames, with the box of small cells: bytes for restore()."""
         return saved("shallow_detail_save", self._ctx, self.pointer)
 
-    def restore(self, state):
-        """Restores a saved state; the liquid then continues as the saved one did."""
+    def restore(self, state: bytes) -> None:
+        """As Shallow.restore; moves the box of small cells to where it was."""
         call("shallow_detail_restore", self._ctx.pointer, self.pointer, state, len(state))

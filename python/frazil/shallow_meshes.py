@@ -1,57 +1,80 @@
 """Meshes of shallow liquids, and the drops that are in the air."""
 
+from __future__ import annotations
+
 import ctypes as c
-from typing import NamedTuple, Optional
+from typing import TYPE_CHECKING, Any, List, Literal, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from ._library import ShallowDropsTarget, ShallowLayout, ShallowSize, ShallowTarget, Span, call, span
+from ._library import call, span
+from ._structs import ShallowDropsTarget, ShallowLayout, ShallowSize, ShallowTarget, Span
+from .context import Context
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
 # What Shallow.drops lists.
 DROP = np.dtype([("position", "f8", 3), ("velocity", "f8", 3), ("volume", "f8"), ("radius", "f8"), ("age", "f8"), ("source", "u8"),
                  ("number", "u8"), ("concentrations", "f4", 4)])
 LIFTED, SKIRTED = 4, 8
 # Parts of a surface that are written on request: the type, and the number of components.
-PARTS = {
+SurfacePart = Literal["normals", "depths", "opacities", "velocities", "layers", "columns"]
+PARTS: dict[str, tuple[type[Any], int]] = {
     "normals": (np.float32, 3), "depths": (np.float32, 1), "opacities": (np.float32, 1), "velocities": (np.float32, 3),
     "layers": (np.uint32, 1), "columns": (np.uint32, 1),
 }
 
 
 class Surface(NamedTuple):
-    """The surface of a liquid: positions (n, 3), triangles (t, 3) that face up; scalars if the liquid carries
-    any, else None; the other fields if they were requested, else None."""
+    """The surface of a liquid. Fields that were not requested are None.
 
-    positions: np.ndarray
-    triangles: np.ndarray
-    normals: Optional[np.ndarray] = None
-    depths: Optional[np.ndarray] = None
-    opacities: Optional[np.ndarray] = None
-    velocities: Optional[np.ndarray] = None
-    layers: Optional[np.ndarray] = None
-    columns: Optional[np.ndarray] = None
-    # An array (n,) for each scalar.
-    scalars: Optional[list] = None
+    positions: (n, 3) float32 (m, times the scale).
+    triangles: (t, 3) uint32, vertex indices; they face up.
+    normals: (n, 3) float32, of unit length.
+    depths: (n,) float32 (m, times the scale), 0 where it is dry.
+    opacities: (n,) float32, the depth divided by opaque_depth, at most 1.
+    velocities: (n, 3) float32, horizontal ones at the surface (m/s, times the scale), 1.5 times the mean over the depth.
+    layers: (n,) uint32, the layer of each vertex's column.
+    columns: (n,) uint32, the index of each vertex's column; frazil.shallow.NO_COLUMN next to a wall or on the ground's edge.
+    scalars: (n,) float32 for each scalar, its concentrations; None if the liquid carries none.
+    """
+
+    positions: npt.NDArray[np.float32]
+    triangles: npt.NDArray[np.uint32]
+    normals: Optional[npt.NDArray[np.float32]] = None
+    depths: Optional[npt.NDArray[np.float32]] = None
+    opacities: Optional[npt.NDArray[np.float32]] = None
+    velocities: Optional[npt.NDArray[np.float32]] = None
+    layers: Optional[npt.NDArray[np.uint32]] = None
+    columns: Optional[npt.NDArray[np.uint32]] = None
+    scalars: Optional[List[npt.NDArray[np.float32]]] = None
 
 
 class Drops(NamedTuple):
-    """A mesh of the liquid in the air: positions and velocities (n, 3), the index (n,) of each vertex's drop, and triangles (t, 3) that face
-    outward."""
+    """A mesh of the liquid in the air.
 
-    positions: np.ndarray
-    velocities: np.ndarray
-    drops: np.ndarray
-    triangles: np.ndarray
+    positions: (n, 3) float32 (m, times the scale).
+    velocities: (n, 3) float32 (m/s, times the scale), of each vertex's drop.
+    drops: (n,) uint32, the index of each vertex's drop in Shallow.drops.
+    triangles: (t, 3) uint32, vertex indices; they face outward.
+    """
+
+    positions: npt.NDArray[np.float32]
+    velocities: npt.NDArray[np.float32]
+    drops: npt.NDArray[np.uint32]
+    triangles: npt.NDArray[np.uint32]
 
 
-def layout_of(z_up, left_handed, scale):
+def layout_of(z_up: bool, left_handed: bool, scale: float) -> ShallowLayout:
     layout = ShallowLayout()
     call("shallow_layout_init", c.byref(layout), c.sizeof(layout))
     layout.flags, layout.scale = int(z_up) | 2 * int(left_handed), scale
     return layout
 
 
-def surface_of(name, ctx, pointer, parts, z_up, left_handed, scale, least_depth, opaque_depth, lifted, fade_depth, skirted, scalars):
+def surface_of(name: str, ctx: Context, pointer: int, parts: Sequence[str], z_up: bool, left_handed: bool, scale: float, least_depth: float,
+               opaque_depth: float, lifted: bool, fade_depth: float, skirted: bool, scalars: int) -> Surface:
     """The surface of a liquid or a snapshot."""
     unknown = [part for part in parts if part not in PARTS]
     if unknown:
@@ -75,7 +98,7 @@ def surface_of(name, ctx, pointer, parts, z_up, left_handed, scale, least_depth,
     return Surface(flat.pop("positions"), triangles, scalars=carried or None, **flat)
 
 
-def drops_of(name, pointer):
+def drops_of(name: str, pointer: int) -> npt.NDArray[np.void]:
     """The liquid in the air."""
     count = c.c_size_t()
     call(name, pointer, Span(None, 0, 0), c.byref(count))
@@ -85,7 +108,7 @@ def drops_of(name, pointer):
     return out
 
 
-def drops_mesh_of(name, ctx, pointer, z_up, left_handed, scale):
+def drops_mesh_of(name: str, ctx: Context, pointer: int, z_up: bool, left_handed: bool, scale: float) -> Drops:
     """A mesh of the liquid in the air."""
     layout, size = layout_of(z_up, left_handed, scale), ShallowSize(c.sizeof(ShallowSize))
     target = ShallowDropsTarget(c.sizeof(ShallowDropsTarget), 32)

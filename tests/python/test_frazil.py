@@ -2,6 +2,7 @@
 
 import gc
 import importlib.util
+import inspect
 import json
 import os
 import pathlib
@@ -18,7 +19,7 @@ import unittest
 import numpy as np
 
 import frazil
-from frazil import _library
+from frazil import _structs
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
@@ -60,12 +61,12 @@ class Structs(unittest.TestCase):
         text = re.sub(r"/\*.*?\*/", "", header.read_text(), flags=re.DOTALL)
         places = {}
         for fields, struct in re.findall(r"typedef struct\b[^;{]*\{(.*?)\} (frz_\w+);", text, flags=re.DOTALL):
-            kind = _library.STRUCTS[struct]
-            places[f"sizeof({struct})"] = _library.c.sizeof(kind)
+            kind = _structs.STRUCTS[struct]
+            places[f"sizeof({struct})"] = _structs.c.sizeof(kind)
             for field in re.findall(r"(\w+)(?:\[\w+\])*;", fields):
                 places[f"offsetof({struct}, {field})"] = getattr(kind, field).offset
         structs = {place[len("sizeof("):-1] for place in places if place.startswith("sizeof(")}
-        self.assertEqual(structs, set(_library.STRUCTS))
+        self.assertEqual(structs, set(_structs.STRUCTS))
         self.assertGreater(len(places), 400)
         # The compiler compares them: of the first one that differs it says the name.
         lines = [f'_Static_assert({place} == {value}, "{place}");' for place, value in places.items()]
@@ -665,6 +666,12 @@ class Shallow(unittest.TestCase):
         self.assertEqual(water.balance.error, 0)
         with self.assertRaisesRegex(frazil.Error, "lie outside of the domain"):
             water.near = (1, 1, 2, 2)
+
+    def test_positions_may_be_arrays(self):
+        blood = self.spill(frazil.Context())
+        blood.set_flows([frazil.Source(np.zeros(3), rate=1e-6), frazil.Drain(np.array([0.01, 0, 0]), rate=1e-6)])
+        blood.step(1 / 60)
+        self.assertAlmostEqual(blood.balance.sourced, 1e-6 / 60, delta=1e-9)
 
     def test_numpy_sees_the_librarys_memory(self):
         ctx = frazil.Context()
@@ -1379,6 +1386,59 @@ class Runs(OfScenes):
 
 
 class Packaging(unittest.TestCase):
+    @staticmethod
+    def public():
+        """Everything public that has a docstring, and the functions behind it, whose annotations count: its name, itself, its functions."""
+        for name in frazil.__all__:
+            value = getattr(frazil, name)
+            if inspect.isfunction(value):
+                yield name, value, [value]
+            elif inspect.ismodule(value):
+                yield name, value, []
+                for of_module, function in inspect.getmembers(value, inspect.isfunction):
+                    if function.__module__ == value.__name__ and not of_module.startswith("_"):
+                        yield f"{name}.{of_module}", function, [function]
+            elif inspect.isclass(value):
+                yield name, value, [value.__init__] if inspect.isfunction(value.__init__) else []
+                for member in dir(value):
+                    static = inspect.getattr_static(value, member)
+                    if member.startswith("_"):
+                        continue
+                    if isinstance(static, property):
+                        yield f"{name}.{member}", static, [part for part in (static.fget, static.fset) if part is not None]
+                    elif isinstance(static, (classmethod, staticmethod)):
+                        yield f"{name}.{member}", static.__func__, [static.__func__]
+                    elif inspect.isfunction(static):
+                        yield f"{name}.{member}", static, [static]
+
+    def test_everything_public_has_types_and_a_docstring(self):
+        lacking, seen = [], 0
+        for name, documented, functions in self.public():
+            seen += 1
+            # A NamedTuple without a docstring gets its signature as one.
+            if not documented.__doc__ or documented.__doc__.startswith(f"{name}("):
+                lacking.append(f"{name}: a docstring")
+            for function in functions:
+                signature = inspect.signature(function)
+                lacking += [f"{name}: the type of {given.name}" for given in signature.parameters.values()
+                            if given.annotation is given.empty and given.name not in ("self", "cls")]
+                if signature.return_annotation is signature.empty:
+                    lacking.append(f"{name}: the type of what it returns")
+        self.assertEqual(lacking, [])
+        self.assertGreater(seen, 150)
+        self.assertTrue((pathlib.Path(frazil.__file__).parent / "py.typed").is_file())
+
+    def test_the_fields_of_reports_have_types(self):
+        typed = 0
+        for struct in _structs.STRUCTS.values():
+            types = getattr(struct, "__annotations__", {})
+            if types:
+                typed += 1
+                fields = {name for name, *_ in struct._fields_} - {"struct_size", "reserved"}
+                self.assertEqual(set(types), fields, struct)
+                self.assertTrue(struct.__doc__ and struct.__doc__ != _structs.Struct.__doc__, struct)
+        self.assertGreater(typed, 10)
+
     def test_pip_installs_it_and_it_finds_its_library(self):
         version = (ROOT / "Cargo.toml").read_text().split('version = "')[1].split('"')[0]
         self.assertIn(f'version = "{version}"', (ROOT / "python/pyproject.toml").read_text())
@@ -1404,6 +1464,7 @@ class Packaging(unittest.TestCase):
             missing = run().stderr
             self.assertIn("frazil's C library was not found", missing)
             self.assertIn("FRAZIL_LIBRARY", missing)
+            self.assertTrue(os.path.isfile(os.path.join(target, "frazil", "py.typed")))
             shutil.copy(named, os.path.join(target, "frazil", "libfrazil.so.1"))
             self.assertIn(target, run().stdout)
 
