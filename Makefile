@@ -12,7 +12,7 @@ BUILD := cargo build --release -p frazil -p make_scenes --lib --bin frazil --bin
 # so this one is copied to another folder; `$(BUILD)` puts the whole one back.
 CORE := cargo build --release -p frazil --no-default-features --lib && mkdir -p target/core && cp target/release/libfrazil.a target/core/
 
-.PHONY: setup setup-build setup-core demo test test-hosts test-core test-clients test-farm test-dist sanitize fuzz deny msrv site skinning-numbers pictures lint gates bench header install install-core hosts hosts-core dist wheel test-wheel
+.PHONY: setup setup-build setup-core demo test test-hosts test-core test-clients test-farm test-dist sanitize fuzz deny msrv site skinning-numbers pictures lint gates bench header install install-core hosts hosts-core dist wheel test-wheel blender-zip test-blender
 
 # Everything that building and testing need, from Debian's packages; quick when it is there.
 setup:
@@ -146,6 +146,15 @@ wheel: setup
 # The packages in a bare environment.
 test-wheel: wheel
 	./tools/test-wheel
+
+# The Blender add-on, target/blender/*.zip: an extension for Blender 4.2 and later, and a legacy add-on for Blender 3.4.
+blender-zip: wheel
+	./tools/blender-zip $${CARGO_TARGET_DIR:-target}/release/frazil
+
+# The add-on, installed from its zips into Blender 3.4 (Debian's, also with a window on Xvfb), 4.2, 4.5 and 5.0 (bpy from PyPI).
+test-blender: blender-zip
+	@./tools/clients
+	./tools/test-blender
 
 # The tarball in a bare Debian in a folder (debootstrap; needs root and Debian's mirror).
 test-dist: dist hosts

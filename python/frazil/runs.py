@@ -42,13 +42,18 @@ class Cancelled(RunError):
 def program() -> str:
     """The path of the program: that in FRAZIL_PROGRAM, else that of this package, of the installed tree, or on the PATH.
 
-    Raises FileNotFoundError if there is none."""
+    Raises FileNotFoundError if there is none, PermissionError if this package's may not be run."""
     named = os.environ.get("FRAZIL_PROGRAM")
     if named:
         return named
     here = pathlib.Path(__file__).resolve()
+    own = here.parent / "bin" / "frazil"
+    if own.is_file() and not os.access(own, os.X_OK):
+        # Blender unpacks packages without permissions. Only those who may read it may run it.
+        mode = own.stat().st_mode
+        own.chmod(mode | (mode & 0o444) >> 2)
     # The second: PREFIX/share/frazil/python/frazil/runs.py and PREFIX/bin/frazil
-    near = [folder / "bin" / "frazil" for folder in (here.parent, *list(here.parents)[4:5])]
+    near = [own, *(folder / "bin" / "frazil" for folder in list(here.parents)[4:5])]
     found = next((str(path) for path in near if path.is_file()), None) or shutil.which("frazil")
     if found is None:
         raise FileNotFoundError("the program frazil was not found: set FRAZIL_PROGRAM to its path, or put it on the PATH")

@@ -1375,6 +1375,18 @@ class Runs(OfScenes):
         with self.assertRaises(FileNotFoundError):
             frazil.run(self.folder / "none.toml", self.folder / "other")
 
+    def test_a_program_that_was_unpacked_without_permissions_gets_them(self):
+        os.environ["FRAZIL_PROGRAM"] = ""
+        package = self.folder / "frazil"
+        shutil.copytree(ROOT / "python/frazil", package, ignore=shutil.ignore_patterns("__pycache__"))
+        (package / "bin").mkdir()
+        own = package / "bin/frazil"
+        own.write_text("#!/bin/sh\necho it runs\n")
+        own.chmod(0o640)
+        line = "import frazil, subprocess; subprocess.run([frazil.program()], check=True)"
+        said = subprocess.run([sys.executable, "-c", line], env=os.environ | {"PYTHONPATH": str(self.folder)}, capture_output=True, text=True)
+        self.assertEqual((said.stdout, own.stat().st_mode & 0o777), ("it runs\n", 0o750), said.stderr)
+
     def test_a_missing_program_is_named(self):
         os.environ["FRAZIL_PROGRAM"] = ""
         path, os.environ["PATH"] = os.environ["PATH"], str(self.folder)

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""frazil in Blender: shots of snow, of surfaces that follow liquids and of little liquids are set up, made and loaded."""
+
+from . import settings, shot_panel, figure, objects_panel, check_panel, bake_panel, takes_panel, load_panel
+
+bl_info = {
+    "name": "frazil",
+    "author": "The frazil authors",
+    "version": (0, 2, 0),
+    "blender": (3, 4, 0),
+    "location": "3D View > Sidebar > frazil",
+    "description": "Characters walk through deep snow, meshes follow liquids, little liquids run over surfaces",
+    "category": "Physics",
+}
+
+# In this order: the panels need the properties of shots.
+_MODULES = (settings, shot_panel, figure, objects_panel, check_panel, bake_panel, takes_panel, load_panel)
+
+
+def register():
+    for module in _MODULES:
+        module.register()
+
+
+def unregister():
+    for module in reversed(_MODULES):
+        module.unregister()
