@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """frazil in Blender: shots of snow, of surfaces that follow liquids and of little liquids are set up, made and loaded."""
 
-from . import settings, shot_panel, figure, objects_panel, check_panel, bake_panel, takes_panel, load_panel
+from . import settings, shot_panel, objects_panel, figure, check_panel, bake_panel, takes_panel, load_panel
 
 bl_info = {
     "name": "frazil",
@@ -14,7 +14,7 @@ bl_info = {
 }
 
 # In this order: the panels need the properties of shots.
-_MODULES = (settings, shot_panel, figure, objects_panel, check_panel, bake_panel, takes_panel, load_panel)
+_MODULES = (settings, shot_panel, objects_panel, figure, check_panel, bake_panel, takes_panel, load_panel)
 
 
 def register():

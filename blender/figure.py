@@ -8,6 +8,8 @@ import math
 import bpy
 import mathutils
 
+from . import objects_panel, settings
+
 # Speed of a foot on the ground (m/s), and duration of two steps (s).
 SPEED = 1.1
 ROUND = 1.0
@@ -176,7 +178,7 @@ def _animate(scene, armature, location, metres):
 
 
 class FRAZIL_OT_add_figure(bpy.types.Operator):
-    """Add a figure that walks over the 3D cursor from the first to the last frame of the scene"""
+    """Add a figure that walks over the 3D cursor from the first to the last frame of the scene, and add it to the shot"""
 
     bl_idname = "frazil.add_figure"
     bl_label = "Walking Figure"
@@ -190,7 +192,10 @@ class FRAZIL_OT_add_figure(bpy.types.Operator):
         return context.mode == "OBJECT"
 
     def execute(self, context):
-        add(context, context.scene.cursor.location + mathutils.Vector((0.0, 0.0, self.height)))
+        mesh = add(context, context.scene.cursor.location + mathutils.Vector((0.0, 0.0, self.height)))
+        shot = settings.active(context)
+        if shot is not None and shot.system == "snow":
+            objects_panel.add_objects(shot, [mesh])
         return {"FINISHED"}
 
 

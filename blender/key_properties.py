@@ -262,7 +262,7 @@ def _soft_limits(key):
 def _precision(key):
     """Digits behind the point that show the key's defaults; Blender has at most 6."""
     defaults = [abs(number) for number in [key.default, *(key.presets or {}).values()] if _is_number(number) and number != 0]
-    return min(max([3, *(1 - math.floor(math.log10(number)) for number in defaults)]), 6)
+    return min(max([4 if key.unit == "m" else 3, *(1 - math.floor(math.log10(number)) for number in defaults)]), 6)
 
 
 def _float_property(key):

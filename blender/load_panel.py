@@ -88,7 +88,8 @@ class FRAZIL_OT_load(_Operator):
 class _OfCollection(_Operator):
     """Works on a loaded shot."""
 
-    collection: bpy.props.StringProperty(options={"SKIP_SAVE"}, description="Collection of the loaded shot; without one that of the active object or shot")
+    collection: bpy.props.StringProperty(options={"SKIP_SAVE"},
+                                         description="Collection of the loaded shot; without one that of the active object or shot")
 
 
 class FRAZIL_OT_reload(_OfCollection):
@@ -184,7 +185,7 @@ def _draw_part(box, collection, key, thing):
         row.prop(thing, "hide_render", text="")
     if is_points:
         modifier = points.modifier_of(thing)
-        box.prop(modifier, f'["{points.input_key(modifier, points.SHARE)}"]', text="Shown in Viewport")
+        box.prop(modifier, f'["{points.input_key(modifier, points.SHARE)}"]', text="In Viewport")
 
 
 _CLASSES = (FRAZIL_OT_load, FRAZIL_OT_reload, FRAZIL_OT_unload, FRAZIL_OT_make_native, FRAZIL_OT_show_part, FRAZIL_PT_load)

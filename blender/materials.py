@@ -26,8 +26,6 @@ DYES = {
     "coffee": ((0.045, 0.013, 0.004), 0.0012),
 }
 CLEAR = ((0.02, 0.16, 0.20), 0.05)
-# A density of 1 in the mist's grid is a cell that mist fills: this is its extinction (1/m).
-MIST_EXTINCTION = 25.0
 # Refractive index of ice, which is that of water but for a fiftieth.
 _ICE = 1.31
 _DRY_STAIN_ROUGHNESS = 0.45
@@ -132,7 +130,7 @@ def _fog(part):
     # The shader would read a grid of this name by itself.
     shader.inputs["Density Attribute"].default_value = ""
     scale = nodes.add("ShaderNodeAttribute", 0, volumes.SCALE, attribute_name=volumes.SCALE, attribute_type="OBJECT")
-    amount = nodes.number(MIST_EXTINCTION if "mist" in part.key else 1.0, "Amount")
+    amount = nodes.number(volumes.amount(part), "Amount")
     density = nodes.math("MULTIPLY", nodes.attribute(part.name).outputs["Fac"], scale.outputs["Fac"])
     nodes.link(nodes.math("MULTIPLY", density, amount, 2), shader.inputs["Density"])
     nodes.link(shader.outputs[0], nodes.output.inputs["Volume"])

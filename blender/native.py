@@ -61,7 +61,7 @@ def _prim(thing, folder):
     if not (folder / "shot.usda").is_file():
         raise NativeError(f"{folder / 'shot.usda'} is missing: let the run finish, with output.usd = true")
     if kind in ("base", "snow", "removed"):
-        raise NativeError(f"{thing.name}: Blender cannot mesh {kind}/ by itself: show mesh/base (output.mesh = [\"usd\"]) instead of it, or unload it")
+        raise NativeError(f"{thing.name}: Blender cannot mesh {kind}/: show mesh/base instead (output.mesh = [\"usd\"]) and delete this one")
     numbers = _numbers(folder, kind)
     if len(numbers) == 1:
         # Blender reads a single frame once, and so did the add-on.
@@ -130,6 +130,9 @@ def _add_nodes(thing, reader):
     nodes.node_group = native_nodes.group(has_velocities=meshes.VELOCITY in arrays, has_opacity="alpha" in arrays,
                                           has_sharp_edges=thing[follow.PART].split("/")[0] in follow.SHARP_KINDS,
                                           is_points=reader.type == "POINTCLOUD")
+    if meshes.VELOCITY not in arrays and hasattr(reader, "cycles"):
+        # Vertices differ from frame to frame, so their positions before and after are no motion.
+        reader.cycles.use_deform_motion = False
     if reader.type == "POINTCLOUD":
         points.set_input(nodes, points.MATERIAL, points.material_of(thing))
 

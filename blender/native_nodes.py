@@ -12,8 +12,8 @@ def group(*, has_velocities, has_opacity, has_sharp_edges, is_points):
     """A node group for a kind of part, new unless the .blend file has it.
 
     has_velocities, has_opacity: it has these attributes; has_sharp_edges: between faces that meet at an angle; is_points: it has no faces"""
-    words = [word for word, is_so in (("points", is_points), ("moving", has_velocities), ("opacity", has_opacity), ("sharp", has_sharp_edges)) if is_so]
-    name = " ".join([_GROUP, *words])
+    words = {"points": is_points, "moving": has_velocities, "opacity": has_opacity, "sharp": has_sharp_edges}
+    name = " ".join([_GROUP, *(word for word, is_so in words.items() if is_so)])
     found = bpy.data.node_groups.get(name)
     if found is not None:
         return found

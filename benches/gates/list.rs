@@ -545,11 +545,11 @@ pub const GATES: &[Gate] = &[
     // once they are native, or show nothing; folders of cancelled runs that resume to other bytes; arrays that Alembic holds otherwise;
     // tutorials that cannot be done with the mouse.
     none("blender.operators", "failures"),
-    none("blender.roundtrip_keys", "keys"),
+    none("blender.roundtrip_keys", "failures"),
     gate("blender.roundtrip_ball", "m", Most(1e-4), Open),
-    none("blender.load", "differences"),
-    none("blender.render", "pictures"),
-    none("blender.cancel", "folders"),
+    none("blender.load", "failures"),
+    none("blender.render", "failures"),
+    none("blender.cancel", "failures"),
     none("blender.alembic", "differences"),
     none("blender.tutorials", "tutorials"),
     // 200 meshes whose parts are turned, doubled or mixed, through every door: wrong without a warning; those that mean one solid, but

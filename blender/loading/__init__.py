@@ -103,9 +103,12 @@ def add_part(context, collection, key, frames=None):
         elif part.form == parts.POINTS:
             points.add_modifier(thing, material)
         follow.fill(thing, shown)
+        if is_volume:
+            # 4.2 would remember that the sequence has no frame 0, which is the volume's until it is evaluated.
+            context.view_layer.update()
     except (OSError, RuntimeError, ValueError) as error:
         _remove(thing)
-        raise LoadError(f"{path}: {key}: {error}") from error
+        raise LoadError(_sentence(path, error)) from error
     return thing
 
 
@@ -172,13 +175,14 @@ def collection_of(folder):
 def _opened(path):
     """A folder's frazil.Shot, its frames (sorted, at least one), and the tables of its scene."""
     try:
-        shot = find_frazil().Shot(path)
-        numbers, settings = shot.frames(), parts.scene_of(path)
+        return *follow.open_shot(path), parts.scene_of(path)
     except (OSError, RuntimeError, ValueError) as error:
-        raise LoadError(f"{path}: {error}") from error
-    if not numbers:
-        raise LoadError(f"{path}: no frame is made yet")
-    return shot, numbers, settings
+        raise LoadError(_sentence(path, error)) from error
+
+
+def _sentence(path, error):
+    """An error's text, with the path if it lacks it."""
+    return str(error) if str(path) in str(error) else f"{path}: {error}"
 
 
 class _Frames(dict):
@@ -192,7 +196,7 @@ class _Frames(dict):
         try:
             self[number] = find_frazil().load(self._path, number)
         except (OSError, RuntimeError, ValueError) as error:
-            raise LoadError(f"{self._path}: frame {number}: {error}") from error
+            raise LoadError(_sentence(self._path, error)) from error
         return self[number]
 
 

@@ -56,11 +56,20 @@ def show(things, number, is_forced=False):
     return errors
 
 
+def open_shot(folder):
+    """The frazil.Shot of a folder and its made frames, ascending, at least one. Raises OSError, ValueError."""
+    if not (folder / "scene.toml").is_file():
+        raise FileNotFoundError(f"{folder}: no run made a shot in this folder")
+    shot = find_frazil().Shot(folder)
+    numbers = shot.frames()
+    if not numbers:
+        raise FileNotFoundError(f"{folder}: no frame is made yet")
+    return shot, numbers
+
+
 def _show_shot(folder, things, number, is_forced):
     frazil = find_frazil()
-    numbers = frazil.Shot(folder).frames()
-    if not numbers:
-        raise FileNotFoundError(f"{folder}: no frame is made")
+    _, numbers = open_shot(folder)
     wanted = shown_number(numbers, number)
     late = [thing for thing in things if is_forced or thing.get(FRAME) != wanted or ERROR in thing]
     if not late:

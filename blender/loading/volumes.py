@@ -8,6 +8,13 @@ from . import parts
 
 # Extinction (1/m) of a density of 1, which shaders read from the object.
 SCALE = "frazil:density_scale"
+# A density of 1 in the mist's grid is a cell that mist fills: this is its extinction (1/m), as a renderer shows it.
+_MIST = 25.0
+
+
+def amount(part):
+    """What a part's density is multiplied by, besides SCALE."""
+    return _MIST if "mist" in part.key else 1.0
 
 
 def set_up(thing, folder, part, volume):
@@ -17,6 +24,7 @@ def set_up(thing, folder, part, volume):
     # Grids have Y up.
     thing.rotation_euler = (math.radians(90.0), 0.0, 0.0)
     thing[SCALE] = float(volume.density_scale.get(part.name, 1.0))
+    data.display.density = thing[SCALE] * amount(part)
     velocity = next((name for name in volume.grids if name in parts.VELOCITIES), None)
     if velocity is not None:
         # Blender accepts the name of a grid that it has read, and reads no sequence before the scene is evaluated.

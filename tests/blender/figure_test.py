@@ -78,7 +78,15 @@ def in_other_units():
     scene.unit_settings.scale_length = 1.0
 
 
+def joins_the_shot():
+    bpy.ops.frazil.new_shot(system="snow")
+    bpy.ops.frazil.add_figure()
+    shot = scene.frazil.shots[scene.frazil.active_index]
+    assert len(shot.snow.object) == 1 and shot.snow.object[0].file_object == bpy.context.object
+
+
 addon.check("a figure walks and does not slip", walks)
 addon.check("its mesh is closed and faces outward", is_closed)
 addon.check("a figure in a scene in centimetres", in_other_units)
+addon.check("a figure joins the shot", joins_the_shot)
 addon.finish(package)

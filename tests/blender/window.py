@@ -55,6 +55,12 @@ class Window:
         """Writes a picture of the screen."""
         subprocess.run(["import", "-silent", "-window", "root", str(path)], env=self._env, check=True)
 
+    def look(self, box):
+        """The pixels of a box (left, top, width, height), to compare."""
+        left, top, width, height = box
+        return subprocess.run(["import", "-silent", "-window", "root", "-crop", f"{width}x{height}+{left}+{top}", "rgb:-"], env=self._env,
+                              check=True, capture_output=True).stdout
+
     def words(self, box=None, is_upward=False):
         """What can be read on the screen, or in a box (left, top, width, height): lists of (word, left, top, width, height), one a line."""
         folder = pathlib.Path(self._folder.name)
@@ -97,6 +103,33 @@ class Window:
                 read = "; ".join(" ".join(word[0] for word in line) for line in lines)
                 raise NotFound(f"{label!r} is not on the screen, but: {read}\n{self.log()}")
 
+    def reveal(self, label, box, nth=0):
+        """The centre of a label in a column that scrolls, which is scrolled until the label is there. Raises NotFound."""
+        middle = box[0] + box[2] // 2, box[1] + box[3] // 2
+
+        def found():
+            x, y = self.find(label, box, 0.0, nth)
+            if y > box[1] + box[3] - 50:
+                # What is half seen at the end may be out of reach.
+                self.scroll(*middle, 3)
+                x, y = self.find(label, box, 0.0, nth)
+            return x, y
+
+        try:
+            return found()
+        except NotFound:
+            self.scroll(*middle, -60)
+        before = None
+        while True:
+            try:
+                return found()
+            except NotFound:
+                shown = self.words(box)
+                if shown == before:
+                    raise
+                before = shown
+                self.scroll(*middle, 8)
+
     def shows(self, label, box=None):
         """Whether a label is on the screen now."""
         return any(_matches(line, label) for line in self.words(box))
@@ -108,10 +141,26 @@ class Window:
 
     def click_at(self, x, y, button=1):
         """Clicks on a pixel."""
-        self._xdotool("mousemove", x, y)
+        # In two moves: Blender ignores a click on a button that it does not yet know the mouse to be over.
+        self._xdotool("mousemove", x - 2, y - 2)
         time.sleep(0.2)
+        self._xdotool("mousemove", x, y)
+        time.sleep(0.3)
         self._xdotool("click", button)
-        time.sleep(0.4)
+        time.sleep(0.6)
+
+    def place_cursor(self, x, y):
+        """Puts the 3D cursor on what is seen at a pixel."""
+        self.move(x, y)
+        self._xdotool("keydown", "shift")
+        self._xdotool("click", 3)
+        self._xdotool("keyup", "shift")
+        time.sleep(1)
+
+    def double_click(self):
+        """Clicks twice where the mouse is: a number becomes a field to type into."""
+        self._xdotool("click", "--repeat", 2, "--delay", 80, 1)
+        time.sleep(0.5)
 
     def move(self, x, y):
         """Moves the mouse: keys go to the editor that is under it."""
