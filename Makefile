@@ -152,7 +152,7 @@ blender-zip: wheel
 	./tools/blender-zip $${CARGO_TARGET_DIR:-target}/release/frazil
 
 # The add-on, installed from its zips into Blender 3.4 (Debian's, also with a window on Xvfb), 4.2, 4.5 and 5.0 (bpy from PyPI).
-test-blender: blender-zip
+test-blender: blender-zip demo
 	@./tools/clients
 	./tools/test-blender
 
@@ -160,10 +160,12 @@ test-blender: blender-zip
 test-dist: dist hosts
 	./tools/test-dist
 
-# Blender and usd-core open what frazil writes; installs them (apt-get, and PyPI into target/clients).
+# Other programs: Blender and usd-core open what frazil writes, the packages for pip run in a bare environment, and the Blender add-on in four
+# versions of Blender; installs them (apt-get, and PyPI into target/clients).
 test-clients: setup
 	@./tools/clients
 	cargo test --release --test testsuite -- --nocapture scene::clients:: motion::gltf::
+	@$(MAKE) --no-print-directory test-wheel test-blender
 
 # A shot by openjd-cli and by a Slurm on loopback, compared with that of one process; installs both (apt-get, and PyPI into target/clients).
 test-farm: setup

@@ -72,10 +72,10 @@ class Lesson:
             time.sleep(0.3)
         return True
 
-    def fill(self, label, text, offset=(90, 0)):
+    def fill(self, label, text, nth=0, offset=(90, 0)):
         """Types a value into the field beside a label of the sidebar."""
         def row():
-            x, y = self.window.reveal(label, SIDEBAR)
+            x, y = self.window.reveal(label, SIDEBAR, nth)
             return x, y, self.window.look((x + offset[0] - 25, y - 8, 60, 17))
 
         for _ in range(3):
@@ -108,7 +108,7 @@ class Lesson:
         while not (self.folder / name / "state" / last).is_file():
             assert time.monotonic() < end, f"{name} is not made after {seconds} s\n{self.window.log()}"
             time.sleep(0.5)
-        self.window.find("Done", SIDEBAR)
+        self.window.find("Done", SIDEBAR, seconds=60)
 
     def check(self):
         """Checks the shot, and waits for the report."""
@@ -173,7 +173,7 @@ def walk(lesson):
     lesson.check()
     lesson.picture("check")
     lesson.click("Add Camera")
-    lesson.bake("snow", "objects.0048.json", 600)
+    lesson.bake("snow", "volumes.0048.json", 600)
     lesson.picture("bake")
     lesson.click("Load", nth=1)
     time.sleep(2)
@@ -189,41 +189,38 @@ def walk(lesson):
 
 
 def spill(lesson):
-    """Paint runs down a head."""
-    lesson.begin("Shallow", 24)
+    """Blood runs down a ball."""
+    lesson.begin("Shallow", 48)
     lesson.window.move(*MIDDLE)
     lesson.window.key("shift+a")
     time.sleep(1)
-    lesson.window.click("Monkey", (300, 200, 600, 660))
+    lesson.window.click("UV Sphere", (300, 200, 600, 660))
     time.sleep(1)
     lesson.click("Active Object Is the Terrain")
     lesson.fill("Cell", "0.02")
-    lesson.window.move(*MIDDLE)
-    lesson.window.key("KP_1")
-    time.sleep(2)
-    lesson.window.key("KP_Decimal")
-    time.sleep(2)
-    lesson.window.place_cursor(470, 330)
-    lesson.picture("cursor")
-    lesson.click("Source")
-    lesson.click("Sources: 1")
-    lesson.fill("Radius", "0.08")
-    lesson.fill("Rate", "20000")
+    lesson.click("Source", until=lambda: lesson.window.shows("Sources: 1", SIDEBAR))
+    lesson.click("Sources: 1", until=lambda: lesson.window.shows("Rate", SIDEBAR))
+    lesson.fill("Radius", "0.2")
+    lesson.fill("Rate", "40000")
     lesson.picture("source")
     lesson.check()
-    lesson.bake("shallow", "liquid.0024.json", 300)
+    lesson.bake("shallow", "liquid.0048.json", 300)
     lesson.click("Load", nth=1)
     time.sleep(2)
-    lesson.show_frame(24)
+    lesson.show_frame(30)
+    lesson.window.move(*MIDDLE)
+    lesson.window.key("Home")
+    time.sleep(2)
     lesson.picture("loaded")
-    assert lesson.contents("shallow", "liquid", 24)["liquid"]["liquid"]["faces"] > 100
+    assert lesson.contents("shallow", "liquid", 30)["liquid"]["liquid"]["faces"] > 1000
 
 
 def surface(lesson):
     """A detailed ball follows the particles of a splash."""
     lesson.begin("Surface", 12)
     lesson.fill("Particles", str(lesson.demo / "liquid.%04d.bgeo"), offset=(70, 0))
-    lesson.fill("Mesh", str(lesson.demo / "liquid.ply"), offset=(80, 0))
+    # The row after "Mesh from".
+    lesson.fill("Mesh", str(lesson.demo / "liquid.ply"), nth=1, offset=(80, 0))
     lesson.picture("shot")
     lesson.check()
     lesson.picture("check")
