@@ -17,6 +17,7 @@ use super::files::caught::caught;
 use super::files::source;
 use super::mesh::{self, extension};
 use super::particles;
+use super::usd::primvars::{members_of, vector_of};
 use crate::error::{Error, Result, one_line};
 use crate::geometry::mesh::attributes::{MeshArray, Number, On};
 use crate::geometry::points::{Column, Points, Values};
@@ -177,21 +178,27 @@ impl Array {
 /// The arrays of a mesh, with vectors and colours joined. Names stay unique: a single array keeps its name, and a vector whose name is taken
 /// stays apart.
 fn joined(arrays: &[MeshArray]) -> Vec<Array> {
+    let arrays: Vec<&MeshArray> = arrays.iter().collect();
     let mut out: Vec<Array> = Vec::new();
     let mut is_done = vec![false; arrays.len()];
     for at in 0..arrays.len() {
         if is_done[at] {
             continue;
         }
-        let array = &arrays[at];
+        let array = arrays[at];
         let is_taken = |name: &str| name == "uv" || arrays.iter().any(|other| other.name == name);
-        let vector = vector_of(&array.name).filter(|(name, _)| !is_taken(name));
-        let members = vector.as_ref().and_then(|(_, parts)| members(arrays, &is_done, array, parts));
+        let vector = vector_of(&array.name).map(|vector| {
+            // Without the axis.
+            let stem = &vector.parts[0][..vector.parts[0].len() - 1];
+            (if vector.is_colour { COLOUR } else { stem }.to_string(), vector)
+        });
+        let members = vector.as_ref().filter(|(name, _)| !is_taken(name));
+        let members = members.and_then(|(_, vector)| members_of(&arrays, &is_done, array, &vector.parts));
         match (vector, members) {
-            (Some((name, _)), Some(members)) => {
+            (Some((name, vector)), Some(members)) => {
                 members.iter().for_each(|&member| is_done[member] = true);
-                let parts: Vec<&MeshArray> = members.iter().map(|&member| &arrays[member]).collect();
-                out.push(Array::of(&name, &parts, name == COLOUR));
+                let parts: Vec<&MeshArray> = members.iter().map(|&member| arrays[member]).collect();
+                out.push(Array::of(&name, &parts, vector.is_colour));
             }
             _ => {
                 is_done[at] = true;
@@ -204,34 +211,6 @@ fn joined(arrays: &[MeshArray]) -> Vec<Array> {
 
 /// Name of an array of colours.
 const COLOUR: &str = "color";
-
-/// The vector or colour that an array of this name may be a component of, with the names of all components.
-fn vector_of(name: &str) -> Option<(String, [String; 3])> {
-    const COLOURS: [&str; 3] = ["red", "green", "blue"];
-    if COLOURS.contains(&name) {
-        return Some((COLOUR.into(), COLOURS.map(String::from)));
-    }
-    let stem = name.strip_suffix(['x', 'y', 'z']).filter(|stem| !stem.is_empty())?;
-    let parts = ["x", "y", "z"].map(|axis| format!("{stem}{axis}"));
-    Some((if stem == "Cd" { COLOUR } else { stem }.into(), parts))
-}
-
-/// The indices of the components of a vector, if all of them exist and are of one kind.
-fn members(
-    arrays: &[MeshArray],
-    is_done: &[bool],
-    first: &MeshArray,
-    parts: &[String; 3],
-) -> Option<Vec<usize>> {
-    let is_match = |other: &MeshArray, name: &str| {
-        other.name == name && (other.on, other.number) == (first.on, first.number)
-    };
-    let index = |name: &String| {
-        let found = arrays.iter().position(|other| is_match(other, name))?;
-        (!is_done[found]).then_some(found)
-    };
-    parts.iter().map(index).collect()
-}
 
 #[cfg(test)]
 mod tests {

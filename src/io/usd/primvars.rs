@@ -121,11 +121,14 @@ struct Draft {
     is_fraction: bool,
 }
 
-/// The vector that three arrays form.
-struct Vector {
-    parts: [String; 3],
-    name: String,
-    is_colour: bool,
+/// The vector or colour that three arrays form.
+pub(in crate::io) struct Vector {
+    /// Names of its components.
+    pub parts: [String; 3],
+    /// Name of its primvar.
+    pub name: String,
+    /// Whether it is a colour.
+    pub is_colour: bool,
 }
 
 const COLOUR: &str = "displayColor";
@@ -174,20 +177,27 @@ fn vector_at(arrays: &[&MeshArray], written: &[bool], at: usize) -> Option<Draft
         true => can_be_colours(array.number).then_some("color3f[]"),
         false => triple(array.number),
     }?;
-    let members: Option<Vec<usize>> = parts
-        .iter()
-        .map(|part| {
-            let is_match = |other: &&MeshArray| {
-                other.name == *part && (other.on, other.number) == (array.on, array.number)
-            };
-            arrays.iter().position(is_match).filter(|found| !written[*found])
-        })
-        .collect();
+    let members = members_of(arrays, written, array, &parts);
     Some(Draft { name, class, members: members?, is_fraction: is_colour })
 }
 
+/// The indices of the arrays that are the components of a vector, if all of them are there, of the kind of `first` and not used yet.
+pub(in crate::io) fn members_of(
+    arrays: &[&MeshArray],
+    used: &[bool],
+    first: &MeshArray,
+    parts: &[String; 3],
+) -> Option<Vec<usize>> {
+    let member = |part: &String| {
+        let is_match =
+            |other: &&MeshArray| other.name == *part && (other.on, other.number) == (first.on, first.number);
+        arrays.iter().position(is_match).filter(|found| !used[*found])
+    };
+    parts.iter().map(member).collect()
+}
+
 /// The vector or colour that an array of this name may be a component of.
-fn vector_of(name: &str) -> Option<Vector> {
+pub(in crate::io) fn vector_of(name: &str) -> Option<Vector> {
     const COLOURS: [&str; 3] = ["red", "green", "blue"];
     if COLOURS.contains(&name) {
         let parts = COLOURS.map(String::from);
