@@ -183,7 +183,7 @@ class Window:
     def type(self, text):
         """Types a text over what a field holds, and confirms it."""
         self._xdotool("key", "ctrl+a")
-        self._xdotool("type", "--delay", 30, text)
+        self._xdotool("type", "--delay", 30, "--", text)
         self._xdotool("key", "Return")
         time.sleep(0.4)
 
