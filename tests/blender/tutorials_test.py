@@ -6,6 +6,7 @@ docs/blender.md; NAME: of a tutorial, all without any. Nothing else of frazil is
 
 import json
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -111,7 +112,7 @@ class Lesson:
 
     def check(self):
         """Checks the shot, and waits for the report."""
-        self.click("Check", nth=1, until=lambda: self.window.shows("frames", SIDEBAR))
+        self.click("Check", nth=1, until=lambda: self.window.shows("memory", SIDEBAR))
 
     def show_frame(self, frame):
         """Shows a frame, by the field of the timeline."""
@@ -180,6 +181,8 @@ def spill(lesson):
     time.sleep(1)
     lesson.click("Active Object Is the Terrain")
     lesson.fill("Cell", "0.02")
+    # The top of the ball, seen from above and in front.
+    lesson.window.place_cursor(594, 428)
     lesson.click("Source", until=lambda: lesson.window.shows("Sources: 1", SIDEBAR))
     lesson.click("Sources: 1", until=lambda: lesson.window.shows("Rate", SIDEBAR))
     lesson.fill("Radius", "0.2")
@@ -189,25 +192,30 @@ def spill(lesson):
     lesson.bake("shallow", "liquid.0048.json", 300)
     lesson.load(30)
     lesson.window.move(*MIDDLE)
-    lesson.window.key("Home")
-    time.sleep(2)
+    # To the ball, which is selected.
+    lesson.window.key("KP_Decimal")
+    time.sleep(3)
     lesson.picture("loaded")
     assert lesson.contents("shallow", "liquid", 30)["liquid"]["liquid"]["faces"] > 1000
 
 
 def surface(lesson):
     """A detailed ball follows the particles of a splash."""
+    for path in [lesson.demo / "liquid.ply", *lesson.demo.glob("liquid.00*.bgeo")]:
+        shutil.copy(path, lesson.folder)
     lesson.begin("Surface", 12)
-    lesson.fill("Particles", str(lesson.demo / "liquid.%04d.bgeo"), offset=(70, 0))
+    lesson.fill("Particles", str(lesson.folder / "liquid.%04d.bgeo"), offset=(70, 0))
     # Two rows below, whose own label is too dim to be read.
-    lesson.fill("Particles", str(lesson.demo / "liquid.ply"), offset=(70, 52))
+    lesson.fill("Particles", str(lesson.folder / "liquid.ply"), offset=(70, 52))
     lesson.picture("shot")
     lesson.check()
     lesson.picture("check")
     lesson.bake("surface", "surface.0012.json", 300)
     lesson.load(12)
-    lesson.window.key("Home")
-    time.sleep(2)
+    lesson.click("Add Camera")
+    lesson.window.move(*MIDDLE)
+    lesson.window.key("KP_0")
+    time.sleep(3)
     lesson.picture("loaded")
     assert lesson.contents("surface", "surface", 12)["surface"]["surface"]["faces"] > 10000
 
