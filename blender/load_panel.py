@@ -60,6 +60,8 @@ class FRAZIL_OT_load(_Operator):
     asks: bpy.props.BoolProperty(options={"HIDDEN", "SKIP_SAVE"}, description="Choose the folder in the file browser")
     sets_rate: bpy.props.BoolProperty(name="Set Frame Rate", default=True, description="The scene takes the shot's frames per second")
     extends_range: bpy.props.BoolProperty(name="Extend Frame Range", default=True, description="The scene's frames are extended to the shot's")
+    shows_own: bpy.props.BoolProperty(name="Show Own Objects",
+                                      description="Also show objects and terrain that the shot was given from this scene, and that are in it anyway")
 
     def invoke(self, context, _event):
         if not self.asks:
@@ -68,12 +70,13 @@ class FRAZIL_OT_load(_Operator):
         return {"RUNNING_MODAL"}
 
     def work(self, context):
-        folder, name = self.directory, None
+        folder, name, own = self.directory, None, set()
         if not folder:
             shot = settings.active(context)
             if shot is None:
                 raise loading.LoadError("there is no shot: add one in the panel Shot, or choose a folder to load")
             folder, name = settings.output_folder(shot), shot.name
+            own = set() if self.shows_own else settings.own_kinds(shot)
             # Relative to the .blend file, if the shot's folder is.
             if shot.folder.startswith("//"):
                 folder = f"{shot.folder.rstrip('/')}/{shot.name}"
@@ -82,7 +85,10 @@ class FRAZIL_OT_load(_Operator):
             loading.reload(loaded, context.scene.frame_current)
             return
         name = name or pathlib.Path(bpy.path.abspath(str(folder))).name
-        loading.load_shot(context, folder, collection_name=name, sets_rate=self.sets_rate, extends_range=self.extends_range)
+        collection = loading.load_shot(context, folder, collection_name=name, sets_rate=self.sets_rate, extends_range=self.extends_range)
+        for key in loading.loaded_parts(collection):
+            if key.split("/")[0] in own:
+                loading.show_part(context, collection, key, False)
 
 
 class _OfCollection(_Operator):

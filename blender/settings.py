@@ -323,6 +323,17 @@ def _linked_keys(shot):
         yield from ((group, key) for group in (groups if key.is_table_array else [groups]))
 
 
+def own_kinds(shot):
+    """The kinds of parts of a made frame ("objects", "terrain") that are all in the Blender scene, looking the same."""
+    linked = {}
+    for group, key in _linked_keys(shot):
+        linked.setdefault((key.table, key.name), []).append(getattr(group, f"{key.name}_object") is not None)
+    kinds = {("object", "file"): "objects", ("shallow", "terrain"): "terrain"}
+    found = {kind for key, kind in kinds.items() if all(linked.get(key) or [False])}
+    # Stains are on the loaded terrain only.
+    return found - {"terrain"} if shot.system == "shallow" and get_value(shot, "shallow.stains") else found
+
+
 def _links(shot):
     """The objects to export."""
     out = []

@@ -38,6 +38,9 @@ def main():
         made = sorted(path.name for path in pathlib.Path(folder, shot.name, "mesh").glob("*.usdc"))
         assert made == [f"mesh.{frame:04}.usdc" for frame in range(1, 5)], made
         assert bpy.ops.frazil.load() == {"FINISHED"}
+        # The ball is in the scene already: its copy is hidden.
+        own = [thing for thing in bpy.data.objects if "Icosphere" in thing.name and thing != ball]
+        assert own and all(thing.hide_render and thing.hide_viewport for thing in own), [thing.name for thing in bpy.data.objects]
         scene.frame_set(4)
         snow = [thing for thing in bpy.data.objects if thing.type == "MESH" and len(thing.data.vertices) > 1000]
         assert snow and min(vertex.co.z for vertex in snow[0].data.vertices) >= -1e-6
