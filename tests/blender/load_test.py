@@ -98,7 +98,8 @@ def against_info(things, folder, frame):
     differences = []
     for key, thing in things.items():
         kind = key.split("/")[0]
-        path = next((path for ending in ("vdb", "usdc") for path in [folder / kind / f"{kind}.{frame:04d}.{ending}"] if path.is_file()), None)
+        endings = ("vdb",) if thing.type == "VOLUME" else ("usdc", "ply")
+        path = next((path for ending in endings for path in [folder / kind / f"{kind}.{frame:04d}.{ending}"] if path.is_file()), None)
         if path is None:
             path = folder / "surroundings.usdc"
         held = info(path)
