@@ -31,9 +31,9 @@ static void pools_and_contexts(void) {
     WORKS(frz_pool_create(1, &pool));
     FAILS(frz_context_create(FRZ_ABI_VERSION, NULL, &ctx), FRZ_ERROR_ARGUMENT, "the pool is NULL");
     CHECK(ctx == NULL);
-    FAILS(frz_context_create(FRZ_ABI_VERSION + 1, pool, &ctx), FRZ_ERROR_VERSION, "the header has interface 1.9");
-    FAILS(frz_context_create(FRZ_ABI_VERSION + 0x10000, pool, &ctx), FRZ_ERROR_VERSION, "interface 2.8");
-    FAILS(frz_context_create(0, pool, &ctx), FRZ_ERROR_VERSION, "interface 0.0, this library 1.8");
+    FAILS(frz_context_create(FRZ_ABI_VERSION + 1, pool, &ctx), FRZ_ERROR_VERSION, "the header has interface 1.10");
+    FAILS(frz_context_create(FRZ_ABI_VERSION + 0x10000, pool, &ctx), FRZ_ERROR_VERSION, "interface 2.9");
+    FAILS(frz_context_create(0, pool, &ctx), FRZ_ERROR_VERSION, "interface 0.0, this library 1.9");
     WORKS(frz_context_create(FRZ_ABI_VERSION, pool, &ctx));
     /* A context keeps its threads. */
     frz_pool_destroy(pool);
