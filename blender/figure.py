@@ -106,9 +106,8 @@ def _leg_angles(part):
 
 
 def add(context, location):
-    """Adds the figure, walking straight over a place (m) from the first to the last frame of the scene; returns its mesh object.
-
-    Half of the way lies before the place, half behind it."""
+    """Adds the figure, walking in a straight line from the first to the last frame of the scene, half of it
+    before `location` (scene units) and half behind; returns its mesh object."""
     scene = context.scene
     metres = 1.0 / scene.unit_settings.scale_length
     armature = bpy.data.objects.new("figure", bpy.data.armatures.new("figure"))

@@ -116,7 +116,7 @@ class _Job:
             name = f"{error.filename}: " if error.filename else ""
             self._fail(f"{name}{error.strerror or error}")
         except Exception as error:
-            # A thread has nobody else to whom it could report a fault of the add-on.
+            # The thread has no caller: an unexpected exception becomes the job's error.
             self._fail(f"{type(error).__name__}: {error}")
         finally:
             _running.discard(self)
@@ -319,7 +319,7 @@ atexit.register(end_all)
 
 @contextlib.contextmanager
 def _guarded(process):
-    """While it lasts, a process of this id ends if this process is killed: nobody else would end it."""
+    """While it lasts, a process of this id ends if this process is killed: it would run on."""
     if os.name != "posix":
         yield
         return

@@ -148,7 +148,7 @@ def _check(context, thing, reader, folder):
 
 
 def _replace(thing, reader):
-    """Puts the reader in the place of the object."""
+    """Replaces the object by its reader."""
     name = thing.name
     _add_nodes(thing, reader)
     reader.hide_viewport, reader.hide_render = thing.hide_viewport, thing.hide_render

@@ -15,7 +15,7 @@ ROLES = [("collide", "Collide", "Removes snow and pushes grains"), ("base", "Bas
          ("grains", "Grains", "Pushes grains, removes no snow"), ("static", "Static", "The snow lies on it from the start"),
          ("ignore", "Ignore", "Does nothing")]
 SHAPES = [("sphere", "Sphere", ""), ("capsule", "Capsule", ""), ("box", "Box", "")]
-# Values of a new place of liquid, in metres and millilitres.
+# Values of a new pour, source, drain or absorber, in metres and millilitres.
 _PLACES = {
     "pour": {"radius": 0.02, "volume_ml": 10.0},
     "source": {"radius": 0.01, "rate_ml": 5.0},

@@ -95,7 +95,7 @@ def remove(folder, keep=()):
     record = read_record(folder)
     with _locked(folder):
         files = own_files(folder)
-        # The record goes last: without it nobody knows what the other files are.
+        # The record is removed last: it says which files are a run's.
         last = ["state/files.json", "state/run.lock"]
         for name in [*(name for name in files if name not in last), *last]:
             if name not in keep and not (folder / name).is_symlink():

@@ -22,7 +22,7 @@ def keys(positions, matrices, first):
     """A mesh and keys that move it as the transforms do.
 
     positions: local ones (n, 3); matrices: transforms (4, 4), Y up, m, of the frames from `first` on. Returns (positions (n, 3), keys as in a
-    scene), or None if the motion is not rigid within TOLERANCE, or linear angles would take another way between two frames."""
+    scene), or None if the motion is not rigid within TOLERANCE, or linear angles would take another path between two frames."""
     rotations = _rotations(matrices)
     if rotations is None:
         return None
@@ -121,11 +121,11 @@ def _is_direct(rotations, angles, radius):
     """Whether linear angles keep to the shortest rotation between frames, half way between each two."""
     turned = [mathutils.Matrix(rotation.tolist()).to_quaternion() for rotation in rotations]
     for index in range(1, len(turned)):
-        way = turned[index - 1].rotation_difference(turned[index]).angle
-        way = min(way, 2.0 * math.pi - way)
+        angle = turned[index - 1].rotation_difference(turned[index]).angle
+        angle = min(angle, 2.0 * math.pi - angle)
         middle = rotation_of([(old + new) / 2.0 for old, new in zip(angles[index - 1], angles[index])])
         shortest = np.array(turned[index - 1].slerp(turned[index], 0.5).to_matrix(), dtype=np.float64)
-        if np.abs(middle - shortest).max() * radius > max(_MAX_DETOUR * way * radius, TOLERANCE):
+        if np.abs(middle - shortest).max() * radius > max(_MAX_DETOUR * angle * radius, TOLERANCE):
             return False
     return True
 

@@ -44,7 +44,7 @@ def text_of(value):
     if isinstance(value, dict):
         pairs = (f"{_key_text(key)} = {text_of(item)}" for key, item in value.items())
         return "{ " + ", ".join(pairs) + " }" if value else "{}"
-    raise TypeError(f"a value of the type {type(value).__name__} has no place in a scene")
+    raise TypeError(f"a value of the type {type(value).__name__} cannot be in a scene")
 
 
 def assignment(name, value):

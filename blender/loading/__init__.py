@@ -152,7 +152,7 @@ def reload(collection, frame_number):
     errors = follow.show(things, frame_number, is_forced=True)
     for thing in things:
         if thing.type == "VOLUME":
-            # Blender keeps what it read of a file until it is told.
+            # Blender caches a file's grids until they are unloaded.
             thing.data.grids.unload()
     if errors:
         raise LoadError(errors[0])

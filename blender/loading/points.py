@@ -77,8 +77,8 @@ def _group():
     link(delete.outputs[0], material.inputs["Geometry"])
     link(start.outputs[MATERIAL], material.inputs["Material"])
     link(material.outputs[0], end.inputs[0])
-    for place, node in enumerate((start, radius, chance, is_over, in_viewport, both, points, delete, material, end)):
-        node.location = (180.0 * place, 0.0)
+    for column, node in enumerate((start, radius, chance, is_over, in_viewport, both, points, delete, material, end)):
+        node.location = (180.0 * column, 0.0)
     return group
 
 

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 OGAWA, HDF5 = b"Ogawa", b"\x89HDF\r\n\x1a\n"
-# The scope of an array's values, by what they are of; "whole" is one value for all.
-_SCOPES = {"vertices": "kVertexScope", "faces": "kUniformScope", "corners": "kFacevaryingScope", "whole": "kConstantScope"}
+# Alembic's scope of an array, by the elements that it has values for; "constant" is one value for the whole object.
+_SCOPES = {"vertices": "kVertexScope", "faces": "kUniformScope", "corners": "kFacevaryingScope", "constant": "kConstantScope"}
 # Types of single numbers, which also stand for rows of them where Alembic has no vector.
 _NUMBERS = {"f4": "Float", "f8": "Double", "i4": "Int32", "u4": "UInt32", "i8": "Int64", "u1": "Uchar"}
 _NOTHING = Part("", np.zeros((0, 3), np.float32), np.zeros(0, np.uint32), np.zeros(0, np.uint32), None, {})
@@ -43,7 +43,7 @@ def write_alembic(folder: AnyPath, path: AnyPath, frames: Iterable[int] | None =
     out, at their own times. Of a frame that lacks a part, the part's sample is empty.
 
     The mesh "KIND/NAME" of frazil.load is the PolyMesh /KIND/NAME/NAMEShape below two Xforms, its topology that of the frame, its faces clockwise
-    seen from outside, as is usual in Alembic. It has Alembic's own velocities and UVs (of the corners of faces) if the shot has them, and no normals.
+    seen from outside, as usual in Alembic. It has its own velocities and UVs (of the corners of faces) if the shot has them, and no normals.
     Points are a Points object with ids, velocities and widths (two radii). All other arrays are arbGeomParams of the same names, with the scopes
     vertex, uniform (faces) and facevarying (corners): "color" as C3f, vectors of two or three as V2f, V3f, V3d and so on, others as rows of numbers.
 
@@ -93,7 +93,7 @@ class Alembic:
             raise ValueError(f"{file}: it is damaged, or was not written to its end") from None
 
     def at(self, seconds: float) -> Any:
-        """Selects the sample at a time: a whole number would be taken for one, too."""
+        """Selects the sample at a time (s); always a float, because alembic3d takes an integer for a sample's index."""
         return self.abc.ISampleSelector(float(seconds), self.abc.ISampleSelector.TimeIndexType.kNearIndex)
 
     def scope(self, on: str) -> Any:
@@ -118,13 +118,13 @@ class Alembic:
         elif kind == "u4":
             packed = self.imath.UnsignedIntArray(self.imath.DoubleArrayFromBuffer(flat.astype(np.float64)))
         elif kind == "i8":
-            packed = self.whole(flat)
+            packed = self.int32s(flat)
         else:
             packed = getattr(self.imath, {"f4": "Float", "f8": "Double", "i4": "Int"}[kind] + "ArrayFromBuffer")(flat)
         return _NUMBERS[kind], packed, width
 
-    def whole(self, values: npt.NDArray[Any]) -> Any:
-        """Whole numbers, for all of which alembic3d has arrays of 32 bits."""
+    def int32s(self, values: npt.NDArray[Any]) -> Any:
+        """Integers as alembic3d's array of 32 bits: it has none of 64 bits. Raises ValueError for larger ones."""
         if len(values) and not -2**31 <= values.min() <= values.max() < 2**31:
             raise ValueError("it has numbers beyond 32 bits, which alembic3d cannot write")
         return self.imath.IntArrayFromBuffer(np.ascontiguousarray(values, np.int32))
@@ -132,7 +132,7 @@ class Alembic:
 
 @contextlib.contextmanager
 def replaced(path: pathlib.Path) -> Iterator[pathlib.Path]:
-    """A new file beside another, whose place it takes once it is whole; a link stays a link."""
+    """A temporary file in the folder of another, which it replaces once it is complete; symbolic links are followed."""
     path = pathlib.Path(os.path.realpath(path))
     unfinished = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
@@ -246,7 +246,7 @@ class _Shape:
         taken = self._set_points(part) if self.is_points else self._set_mesh(part)
         arrays: dict[str, tuple[npt.NDArray[Any], str]] = {name: array for name, array in part.arrays.items() if name not in taken}
         if part.color is not None and "color" not in arrays:
-            arrays["color"] = np.array([part.color], np.float32), "whole"
+            arrays["color"] = np.array([part.color], np.float32), "constant"
         order = reversed_corners(part.face_counts)
         for name, (values, on) in arrays.items():
             try:
@@ -262,7 +262,7 @@ class _Shape:
         """Returns the names of the arrays that the sample has."""
         abc, order = self.abc, reversed_corners(part.face_counts)
         positions = abc.imath.V3fArrayFromBuffer(np.ascontiguousarray(part.positions))
-        corners, counts = abc.whole(part.indices[order]), abc.whole(part.face_counts)
+        corners, counts = abc.int32s(part.indices[order]), abc.int32s(part.face_counts)
         sample = abc.geom.OPolyMeshSchemaSample(positions, corners, counts)
         taken, velocities = self._velocities(part)
         if velocities is not None:
@@ -297,7 +297,7 @@ class _Shape:
         ids = np.arange(len(part.positions)) if ids is None else ids
         if len(ids) and ids.min() < 0:
             raise ValueError("it has negative ids")
-        sample = abc.geom.OPointsSchemaSample(positions, abc.whole(ids))
+        sample = abc.geom.OPointsSchemaSample(positions, abc.int32s(ids))
         if velocities is not None:
             sample.setVelocities(velocities)
         if radii is not None or "widths" in self.own:

@@ -67,7 +67,7 @@ def _read(abc: Alembic, archive: Any, file: str, pattern: str, frames: Iterable[
     numbers = list(frames)
     names = {number: _name(pattern, number) for number in numbers}
     if len(set(names.values())) < len(names):
-        raise ValueError(f"{pattern}: it has no place for a frame's number, as in body.%04d.ply, and there are {len(numbers)} frames")
+        raise ValueError(f"{pattern}: the name has no frame number, as in body.%04d.ply, for {len(numbers)} frames")
     for number in numbers:
         try:
             pieces = [_piece(abc, mesh, number / fps, 1.0 / fps, scale) for mesh in meshes]
@@ -127,8 +127,8 @@ def _ends(samplings: list[Any]) -> list[float]:
 def _name(pattern: str, number: int) -> str:
     """The name of a frame's file."""
     folder, name = os.path.split(pattern)
-    for place in (r"%(\d*)d", r"\$F(\d*)", r"(#+)"):
-        found = list(re.finditer(place, name))
+    for number in (r"%(\d*)d", r"\$F(\d*)", r"(#+)"):
+        found = list(re.finditer(number, name))
         if found:
             digits = found[-1][1]
             width = len(digits) if digits.startswith("#") else int(digits or 1)
@@ -171,7 +171,7 @@ def _change(abc: Alembic, mesh: _Mesh, seconds: float, frame: float) -> npt.NDAr
 
 
 def _between(first: npt.NDArray[np.float64], second: npt.NDArray[np.float64], share: float) -> npt.NDArray[np.float64]:
-    """A transform between two: what it shifts and stretches changes linearly, and it rotates along the shortest arc."""
+    """Interpolates two transforms: translation and stretch linearly, rotation along the shortest arc."""
     out = (1.0 - share) * first + share * second
     turns, stretches = [], []
     for rows in (first[:3, :3], second[:3, :3]):

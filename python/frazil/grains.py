@@ -100,7 +100,7 @@ class Grains(Handle):
             params.flags |= AIR_BY_DENSITY
         if keep_box is not None:
             params.flags |= BOX
-            params.keep_low, params.keep_high = ((c.c_double * 3)(*place) for place in keep_box)
+            params.keep_low, params.keep_high = ((c.c_double * 3)(*corner) for corner in keep_box)
         if repose_angle_deg is not None or stands is not None:
             call("grains_params_of_snow", c.byref(params), 32.0 if repose_angle_deg is None else repose_angle_deg,
                  stands or 0.0)
@@ -144,12 +144,12 @@ class Grains(Handle):
         frame: their source frame.
 
         Raises ValueError for another shape; after a failure no grain was added."""
-        places = rows(positions, np.float32, 3)
+        points = rows(positions, np.float32, 3)
         fast = None if velocities is None else rows(velocities, np.float32, 3)
         first = c.c_int64()
-        call("grains_emit", self._ctx.pointer, self.pointer, view(places),
+        call("grains_emit", self._ctx.pointer, self.pointer, view(points),
              View(None, 0, 0) if fast is None else view(fast), frame, c.byref(first))
-        return np.arange(first.value, first.value + len(places))
+        return np.arange(first.value, first.value + len(points))
 
     def __len__(self) -> int:
         count = c.c_size_t()

@@ -1,4 +1,4 @@
-"""Level sets: made from meshes, particles and motion, and changed in place.
+"""Level sets: made from meshes, particles and motion, and modified in place.
 
 half_width is half the width of the band of distances (voxels), 3 to 64; voxel_size is the edge of a voxel (m), 1e-6 to 1000. A grid that is changed
 in place must not belong to another object, and is unchanged after a failure."""

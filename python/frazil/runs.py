@@ -1,4 +1,4 @@
-"""The program, from Python: a shot is made in a process of its own, which tells its progress, can be ended and resumes."""
+"""The program, from Python: a shot is made in a process of its own, which reports its progress, can be cancelled and resumes."""
 
 from __future__ import annotations
 
@@ -165,7 +165,7 @@ def _lines(stream: IO[str]) -> Generator[str | None, None, None]:
                 return
             yield line
     finally:
-        # The process ends, or was told to: nobody closes the stream under the reader.
+        # The process is ending: the reader thread must finish before its stream is closed.
         reader.join()
 
 

@@ -207,7 +207,7 @@ class Shallow(Handle):
     @property
     def drops(self) -> npt.NDArray[np.void]:
         """The liquid in the air: an array (n,) with the fields position (3) (m), velocity (3) (m/s), volume (m3), radius (m) and age (s), float64;
-        source, the edge that it fell from, and number, its place among the drops from there, uint64; and concentrations (4), float32."""
+        source, the edge that it fell from, and number, its index among the drops from there, uint64; and concentrations (4), float32."""
         return drops_of("shallow_drops", self.pointer)
 
     def drops_mesh(self, z_up: bool = False, left_handed: bool = False, scale: float = 1.0) -> Drops:

@@ -46,8 +46,8 @@ def walks():
     assert slip < 2e-3, slip
     # The middle of the walk is over the cursor, and it goes along -Y.
     middles = walk.mean(axis=1)
-    way = middles[-1] - middles[0]
-    assert abs(way[1] + 1.1 * 47 / 24) < 0.05 and abs(way[0]) < 0.02, way
+    path = middles[-1] - middles[0]
+    assert abs(path[1] + 1.1 * 47 / 24) < 0.05 and abs(path[0]) < 0.02, path
     assert np.abs((middles[0] + middles[-1])[:2] / 2 - (0.5, -0.25)).max() < 0.05
     return f"{1000 * slip:.1f} mm"
 

@@ -172,7 +172,7 @@ def heights_are_proposed(shots):
 
 @test
 def objects_of_blender_are_moved_and_scaled(shots):
-    for place, word, where in ((0.5, "lower by 0.500 m", 0.0), (-0.2, "raise by 0.200 m", 0.0)):
+    for height, word, where in ((0.5, "lower by 0.500 m", 0.0), (-0.2, "raise by 0.200 m", 0.0)):
         mesh = bpy.data.meshes.new("cube")
         corners = [(x, y, z) for x in (-0.05, 0.05) for y in (-0.05, 0.05) for z in (0.0, 0.1)]
         faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -181,7 +181,7 @@ def objects_of_blender_are_moved_and_scaled(shots):
         bpy.context.scene.collection.objects.link(cube)
         # It moves, and is exported with keys.
         for frame in (1, 6):
-            cube.location = (frame * 0.01, 0.0, place)
+            cube.location = (frame * 0.01, 0.0, height)
             cube.keyframe_insert("location", frame=frame)
         shot = shots.new(cube.name, SNOW.partition("[[object]]")[0])
         shots.settings.add_table(shot, "object")

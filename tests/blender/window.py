@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A Blender with a window, on an X server of its own (Xvfb), used with the mouse and the keyboard (xdotool). Labels are found by reading the
-picture of the screen (tesseract), as somebody would find them who looks at it."""
+picture of the screen (tesseract), as a user finds them."""
 
 import difflib
 import os
