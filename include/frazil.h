@@ -3797,7 +3797,7 @@ frz_status frz_levelset_sweep(frz_context *context,
  *
  * path: UTF-8.
  * out: receives the parts, to be destroyed with frz_geometry_destroy; NULL after a failure. FRZ_ERROR_FILE for a file that is empty, cut
- *     short or damaged, or holds neither meshes nor points.
+ *     short or damaged, holds neither meshes nor points, or only the points that changed since another frame (`grains_mode = "delta"`).
  *
  * One thread at a time for each context.
  */

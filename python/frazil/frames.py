@@ -120,24 +120,22 @@ class Shot:
         with Context() as ctx:
             for kind, files in by_kind.items():
                 if kind in _VOLUMES:
-                    self._add_volume(ctx, out, kind, files[".vdb"])
+                    # With base_mode = "delta" the record says that its stage's files hold changes; of those only the base does.
+                    is_whole = kind != "base" or not any(record["keeps"] == "changes" for record in records)
+                    self._add_volume(ctx, out, kind, files[".vdb"], is_whole)
                 else:
                     self._add_parts(ctx, out, kind, files)
         return out
 
-    def _add_volume(self, ctx: Context, frame: Frame, kind: str, path: pathlib.Path) -> None:
+    def _add_volume(self, ctx: Context, frame: Frame, kind: str, path: pathlib.Path, is_whole: bool) -> None:
         grids = list_grids(ctx, path)
         scales = {grid.name: grid.density_scale for grid in grids if grid.density_scale is not None}
-        is_whole = kind != "base" or self._settings.get("output.base_mode") != '"delta"' or frame.number == self.first
         frame.volumes[kind] = Volume(path, [grid.name for grid in grids], scales, is_whole)
 
     def _add_parts(self, ctx: Context, frame: Frame, kind: str, files: dict[str, pathlib.Path]) -> None:
         endings = [ending for ending in _ENDINGS if ending in files]
         if not endings:
             return
-        if endings[0] == ".vdb" and self._settings.get("output.grains_mode") == '"delta"' and (frame.number - self.first) % 24:
-            raise ValueError(f"{files['.vdb']}: it has only what changed since the frame before: "
-                             f"`frazil vdb rebuild --stage grains` makes whole files")
         for part in load_geometry(ctx, files[endings[0]]):
             of = frame.points if kind == "grains" else frame.meshes
             of[_key(kind, part.name)] = part

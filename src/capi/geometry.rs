@@ -5,9 +5,11 @@ use std::path::Path;
 
 use super::ffi::*;
 use super::runtime::context::{creates, frz_context};
+use crate::error::Error;
 use crate::geometry::mesh::attributes::On;
 use crate::io::geometry::{self, ArrayValues, Part};
 use crate::io::mesh::extension;
+use crate::vdb::changes::{changes_since, partial};
 use crate::vdb::points;
 
 /// The meshes and points of a file.
@@ -125,7 +127,7 @@ impl Geometry {
 ///
 /// path: UTF-8.
 /// out: receives the parts, to be destroyed with frz_geometry_destroy; NULL after a failure. FRZ_ERROR_FILE for a file that is empty, cut
-///     short or damaged, or holds neither meshes nor points.
+///     short or damaged, holds neither meshes nor points, or only the points that changed since another frame (`grains_mode = "delta"`).
 ///
 /// One thread at a time for each context.
 #[unsafe(no_mangle)]
@@ -139,9 +141,13 @@ pub unsafe extern "C" fn frz_geometry_load(
         creates(context, out, |ctx| {
             let path = Path::new(required_text(path, "path")?);
             let parts = ctx.phase("read", || match &*extension(path) {
-                "vdb" => Ok(vec![points::read(path, None)?.into()]),
+                "vdb" => match changes_since(path)? {
+                    Some(since) => Err(Error::file(path, partial(since))),
+                    None => Ok(vec![points::read(path, None)?.into()]),
+                },
                 _ => geometry::read(path),
             })?;
+            ctx.allow(&path.display().to_string(), parts.iter().map(Part::memory_bytes).sum())?;
             Geometry::of(parts)
         })
     }

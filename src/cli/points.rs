@@ -201,7 +201,7 @@ const NAME: &str = "grains";
 /// A file that holds only changes since another frame.
 #[cfg(feature = "vdb")]
 pub fn points_of_vdb(path: &Path) -> Result<Points> {
-    use frazil::scene::{changes_since, partial};
+    use frazil::vdb::changes::{changes_since, partial};
     match changes_since(path)? {
         Some(since) => Err(Error::file(path, partial(since))),
         None => frazil::vdb::points::read(path, None),

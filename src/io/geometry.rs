@@ -100,6 +100,21 @@ pub fn read(path: &Path) -> Result<Vec<Part>> {
 }
 
 impl Part {
+    /// Memory of its arrays (bytes).
+    pub fn memory_bytes(&self) -> u64 {
+        let numbers = |array: &Array| match &array.values {
+            ArrayValues::F32(all) => size_of_val(&all[..]),
+            ArrayValues::F64(all) => size_of_val(&all[..]),
+            ArrayValues::I32(all) => size_of_val(&all[..]),
+            ArrayValues::U32(all) => size_of_val(&all[..]),
+            ArrayValues::I64(all) => size_of_val(&all[..]),
+            ArrayValues::U8(all) => all.len(),
+        };
+        let arrays: usize = self.arrays.iter().map(numbers).sum();
+        let faces = size_of_val(&self.face_counts[..]) + size_of_val(&self.corners[..]);
+        (size_of_val(&self.positions[..]) + faces + arrays) as u64
+    }
+
     /// A mesh.
     fn of_mesh(name: String, mesh: PolygonMesh) -> Self {
         let face_counts = mesh.polygons().map(|face| face.len() as u32).collect();

@@ -33,10 +33,7 @@ pub use objects::Objects;
 pub use schema::{FrameChoice, Frames, Override, Value, Values};
 pub use shallow::Shallow;
 #[cfg(feature = "vdb")]
-pub use snow::{
-    FootSlip, Forecast, Inputs, MovingObjects, Rebuild, RebuildGrains, changes_since, check_memory, estimate,
-    partial,
-};
+pub use snow::{FootSlip, Forecast, Inputs, MovingObjects, Rebuild, RebuildGrains, check_memory, estimate};
 pub use surface::Surface;
 pub use systems::{Take, keys_json, reference, template};
 

@@ -4,6 +4,7 @@
 //! voxel size, unless a file has another transform.
 
 mod bridge;
+pub mod changes;
 pub mod distances;
 pub mod file;
 mod grid;

@@ -6,6 +6,7 @@ import inspect
 import json
 import os
 import pathlib
+import random
 import re
 import shutil
 import signal
@@ -1285,8 +1286,14 @@ fog = ["base", "grains"]
             frazil.load(self.folder / "out", 3)
         with self.assertRaises(FileNotFoundError):
             frazil.load(self.folder / "none", 1)
-        with self.assertRaisesRegex(ValueError, "grains.0002.vdb: it has only what changed"):
+        # A part of the grains is not taken for all of them.
+        with self.assertRaisesRegex(frazil.Error, "grains.0002.vdb: holds only the grains that changed since frame 1"):
             frazil.load(self.folder / "out", 2)
+        frazil.run(self.scene, self.folder / "base", settings=[settings[0]], frames="1-2", stages=["base"])
+        second = frazil.load(self.folder / "base", 2).volumes["base"]
+        self.assertFalse(second.is_whole)
+        with frazil.Context(threads=1) as ctx, self.assertRaisesRegex(ValueError, "base.0002.vdb: it has only what changed"):
+            second.load(ctx, "surface")
         first = frazil.load(self.folder / "out", 1)
         self.assertTrue(first.volumes["base"].is_whole)
         (self.folder / "out/grains/grains.0001.vdb").write_bytes(b"cut")
@@ -1302,6 +1309,39 @@ fog = ["base", "grains"]
             self.assertEqual(mesh.face_counts.tolist(), [4] * 6)
             with self.assertRaisesRegex(ValueError, "no triangles"):
                 mesh.triangles
+
+    def test_damaged_files_are_a_sentence_or_consistent(self):
+        frazil.run(self.scene, self.folder / "out", frames="1-2", settings=['output.grains=["usd", "vdb", "ply"]', 'output.objects=["usd", "ply"]'])
+        files = [next((self.folder / "out" / name).parent.glob(pathlib.Path(name).name)) for name in
+                 ("objects/*2.usdc", "objects/*2.ply", "grains/*2.usdc", "grains/*2.ply")]
+        files.append(self.folder / "box.ply")
+        chance = random.Random(1)
+        refused = 0
+        count = int(os.environ.get("FRAZIL_FUZZ", 200))
+        with frazil.Context() as ctx:
+            for at in range(count):
+                source = files[at % len(files)]
+                content = bytearray(source.read_bytes())
+                if chance.random() < 0.3:
+                    content = content[:chance.randrange(len(content))]
+                for _ in range(chance.choice((1, 1, 3, 20)) if content else 0):
+                    content[chance.randrange(min(len(content), chance.choice((200, 4000, 10**9))))] = chance.randrange(256)
+                damaged = self.folder / f"damaged{source.suffix}"
+                damaged.write_bytes(content)
+                try:
+                    parts = frazil.load_geometry(ctx, damaged)
+                except frazil.Error as error:
+                    self.assertIn("damaged", str(error))
+                    self.assertNotIn("internal", str(error))
+                    refused += 1
+                    continue
+                for part in parts:
+                    self.assertEqual(part.face_counts.sum(), len(part.indices))
+                    self.assertTrue((part.indices < len(part.positions)).all())
+                    lengths = {"vertices": len(part.positions), "corners": len(part.indices), "faces": len(part.face_counts)}
+                    for name, array in part.arrays.items():
+                        self.assertEqual(len(array.values), lengths[array.on], name)
+        self.assertGreater(refused, count // 10)
 
 
 class Runs(OfScenes):

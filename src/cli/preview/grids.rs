@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::parts::Part;
-use frazil::scene::{changes_since, partial};
+use frazil::vdb::changes::{changes_since, partial};
 use frazil::vdb::{file, points};
 
 /// Name of the fog volume to draw: other fog volumes in the same file are temperatures, fuels and the like.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use frazil::Context;
-use frazil::scene::{changes_since, partial};
+use frazil::vdb::changes::{changes_since, partial};
 use frazil::vdb::{MetaValue, distances, file, level_set, points};
 use serde_json::{Map, Value, json};
 

@@ -5,7 +5,6 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::grain_params::params;
-use super::stages::grain_files::{changes_since, partial};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::points::Values;
@@ -17,6 +16,7 @@ use crate::io::records::input_hashes::InputHashes;
 use crate::scene::Scene;
 use crate::scene::schema::rounded;
 use crate::snow::grains::{Grains, MAX_SPEED, Params};
+use crate::vdb::changes::{changes_since, partial};
 use crate::vdb::{FloatGrid, points};
 
 /// Number of points that are tested together.

@@ -39,7 +39,6 @@ pub use {
     inspect::foot_slip::FootSlip,
     moving_objects::MovingObjects,
     pipeline::pipeline,
-    stages::grain_files::{changes_since, partial},
     stages::grain_reader::RebuildGrains,
     stages::rebuild::Rebuild,
 };

@@ -5,7 +5,6 @@
 //! Attributes set at birth are 0 there unless the grain is new. A grain that is not in the file is not trapped.
 
 use std::ops::RangeInclusive;
-use std::path::Path;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -14,41 +13,18 @@ use crate::io::files::hash::Hasher;
 use crate::scene::Scene;
 use crate::scene::run::FrameFiles;
 use crate::scene::vdb_metadata::metadata;
-use crate::vdb::file::{self, WriteOptions};
+use crate::vdb::changes::{CHANGES_SINCE_KEY, since};
+use crate::vdb::file::WriteOptions;
 use crate::vdb::{MetaValue, points};
 
 /// Interval (frames) of complete files.
 pub(in crate::scene::snow) const WHOLE_EVERY: i32 = 24;
-/// Metadata of a file of changes: the previous frame.
-pub(super) const SINCE: &str = "frazil:changes_since";
 /// Metadata of a file of changes: the identities that are gone since then.
 pub(super) const GONE: &str = "frazil:gone";
 /// Metadata of a file of changes: [`hash_of`] the previous frame's grains.
 pub(super) const BEFORE_HASH: &str = "frazil:changes_of";
 /// Identities are less than this.
 const ID_END: i64 = 1 << 32;
-
-/// The frame since which a .vdb file contains changes; none if it is complete.
-///
-/// # Errors
-/// A file that cannot be read.
-pub fn changes_since(path: &Path) -> Result<Option<i32>> {
-    Ok(since(&file::metadata(path)?))
-}
-
-/// Message about a file that contains changes since a frame.
-pub fn partial(since: i32) -> String {
-    format!(
-        "holds only the grains that changed since frame {since}: `frazil vdb rebuild DIR --stage grains` makes it whole"
-    )
-}
-
-fn since(metadata: &[(String, MetaValue)]) -> Option<i32> {
-    metadata.iter().find_map(|(key, value)| match value {
-        MetaValue::Int(frame) if key == SINCE => Some(*frame as i32),
-        _ => None,
-    })
-}
 
 /// Points sorted by identity.
 pub(in crate::scene::snow) fn ordered(mut points: Points) -> Points {
@@ -106,7 +82,7 @@ pub(in crate::scene::snow) fn write(
         None => bytes(points, metadata)?,
         Some(before) => {
             let (changed, gone) = changes(before, points);
-            metadata.push((SINCE.into(), MetaValue::Int(i64::from(files.frame) - 1)));
+            metadata.push((CHANGES_SINCE_KEY.into(), MetaValue::Int(i64::from(files.frame) - 1)));
             metadata.push((BEFORE_HASH.into(), MetaValue::Text(hash_of(before))));
             metadata.push((GONE.into(), MetaValue::Text(runs_to_text(&runs(&gone)))));
             bytes(&changed, metadata)?

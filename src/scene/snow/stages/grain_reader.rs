@@ -2,15 +2,14 @@
 
 use std::path::Path;
 
-use super::grain_files::{
-    BEFORE_HASH, GONE, NAME, SINCE, apply_changes, hash_of, ids_of, ordered, previous_record,
-};
+use super::grain_files::{BEFORE_HASH, GONE, NAME, apply_changes, hash_of, ids_of, ordered, previous_record};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::points::{Points, Values};
 use crate::io::particles::{self, ParticleData};
 use crate::io::usd::BINARY;
 use crate::scene::run::DoneFrames;
+use crate::vdb::changes::CHANGES_SINCE_KEY;
 use crate::vdb::file::{self, WriteOptions};
 use crate::vdb::{MetaValue, points};
 
@@ -41,8 +40,9 @@ impl RebuildGrains {
     /// A frame that does not exist; a file that was changed since it was written; cancel.
     pub fn bytes(&mut self, ctx: &Context, frame: i32, options: &WriteOptions) -> Result<Vec<u8>> {
         let (points, mut metadata) = self.reader.points(ctx, &self.stored, frame)?;
-        metadata
-            .retain(|(key, _)| key.starts_with("frazil:") && ![SINCE, GONE, BEFORE_HASH].contains(&&key[..]));
+        metadata.retain(|(key, _)| {
+            key.starts_with("frazil:") && ![CHANGES_SINCE_KEY, GONE, BEFORE_HASH].contains(&&key[..])
+        });
         points::to_bytes(ctx, NAME, points, &WriteOptions { metadata, ..options.clone() })
     }
 

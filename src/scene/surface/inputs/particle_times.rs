@@ -10,9 +10,10 @@ use crate::io::files::source;
 use crate::io::mesh::extension;
 use crate::io::particles::{self, ParticleData};
 use crate::io::records::input_hashes::InputHashes;
+use crate::scene::Shot;
 use crate::scene::surface::Surface;
-use crate::scene::{Shot, changes_since, partial};
 use crate::surface::{Particles, interpolate};
+use crate::vdb::changes::{changes_since, partial};
 use crate::vdb::points;
 
 /// Names of velocities and of ids in files, in lower case.
