@@ -68,13 +68,12 @@ def open_shot(folder):
 
 
 def _show_shot(folder, things, number, is_forced):
-    frazil = find_frazil()
-    _, numbers = open_shot(folder)
+    shot, numbers = open_shot(folder)
     wanted = shown_number(numbers, number)
     late = [thing for thing in things if is_forced or thing.get(FRAME) != wanted or ERROR in thing]
     if not late:
         return []
-    errors, frame = [], frazil.load(folder, wanted)
+    errors, frame = [], shot.load(wanted)
     for thing in late:
         try:
             fill(thing, frame)

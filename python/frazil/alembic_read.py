@@ -127,8 +127,8 @@ def _ends(samplings: list[Any]) -> list[float]:
 def _name(pattern: str, number: int) -> str:
     """The name of a frame's file."""
     folder, name = os.path.split(pattern)
-    for number in (r"%(\d*)d", r"\$F(\d*)", r"(#+)"):
-        found = list(re.finditer(number, name))
+    for marker in (r"%(\d*)d", r"\$F(\d*)", r"(#+)"):
+        found = list(re.finditer(marker, name))
         if found:
             digits = found[-1][1]
             width = len(digits) if digits.startswith("#") else int(digits or 1)

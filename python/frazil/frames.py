@@ -6,7 +6,7 @@ import json
 import os
 import pathlib
 import re
-from typing import Any, Dict, Iterator, List, NamedTuple
+from typing import Any, Dict, List, NamedTuple
 
 from .context import Context
 from .geometry import Part, load_geometry
@@ -94,18 +94,14 @@ class Shot:
 
     def frames(self) -> list[int]:
         """The frames that were made, ascending: those of which at least one stage is done."""
-        return sorted({number for number, _ in self._records()})
-
-    def _records(self) -> Iterator[tuple[int, pathlib.Path]]:
-        """The number of the frame and the path of each record of a stage's frame."""
-        for path in (self.folder / "state").glob("*.json"):
-            number = _FRAME.search(path.name)
-            if number:
-                yield int(number[1]), path
+        found = (_FRAME.search(path.name) for path in (self.folder / "state").glob("*.json"))
+        return sorted({int(number[1]) for number in found if number})
 
     def load(self, number: int) -> Frame:
         """A frame: see frazil.load."""
-        records = [json.loads(path.read_text(encoding="utf-8"))["content"] for frame, path in self._records() if frame == number]
+        # A record for each stage that is done.
+        paths = (self.folder / "state").glob(f"*.{number:04d}.json")
+        records = [json.loads(path.read_text(encoding="utf-8"))["content"] for path in paths]
         if not records:
             raise FileNotFoundError(f"{self.folder}: frame {number} is not made")
         by_kind: dict[str, dict[str, pathlib.Path]] = {}
