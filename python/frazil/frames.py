@@ -101,7 +101,7 @@ class Shot:
         """A frame: see frazil.load."""
         # A record for each stage that is done.
         paths = (self.folder / "state").glob(f"*.{number:04d}.json")
-        records = [json.loads(path.read_text(encoding="utf-8"))["content"] for path in paths]
+        records = [_record(path) for path in sorted(paths)]
         if not records:
             raise FileNotFoundError(f"{self.folder}: frame {number} is not made")
         by_kind: dict[str, dict[str, pathlib.Path]] = {}
@@ -137,6 +137,16 @@ class Shot:
             of[_key(kind, part.name)] = part
 
 
+def _record(path: pathlib.Path) -> Any:
+    """The content of the record of a stage's frame. Raises ValueError if it is damaged."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))["content"]
+        content["files"], content["keeps"]
+    except (ValueError, KeyError, TypeError):
+        raise ValueError(f"{path}: it is damaged") from None
+    return content
+
+
 def _key(kind: str, name: str) -> str:
     """The key of a part: its prim's path below the shot; other files than USD have one part, without a name."""
     names = name.strip("/").split("/")
@@ -166,6 +176,7 @@ def load(folder: str | os.PathLike[str], number: int) -> Frame:
     number: of the frame
 
     Meshes and points are read from .usdc files or, where there are none, from .ply, .obj or .vdb, with the same result. Grids are read when
-    Volume.load is called. Raises FileNotFoundError for a frame that is not made or a folder that no run made, frazil.Error for a file that is
+    Volume.load is called. Raises FileNotFoundError for a frame that is not made or a folder that no run made, ValueError if scene.toml or a record in
+    state/ is damaged, frazil.Error for a file that is
     missing or damaged."""
     return Shot(folder).load(number)

@@ -1299,6 +1299,15 @@ fog = ["base", "grains"]
         (self.folder / "out/grains/grains.0001.vdb").write_bytes(b"cut")
         with self.assertRaisesRegex(frazil.Error, "grains.0001.vdb"):
             frazil.load(self.folder / "out", 1)
+        (self.folder / "out/mist/mist.0002.vdb").unlink()
+        (self.folder / "base/base/base.0002.vdb").write_bytes((self.folder / "base/base/base.0002.vdb").read_bytes()[:900])
+        for folder, name in (("out", "(mist|grains).0002.vdb"), ("base", "base.0002.vdb")):
+            with self.assertRaisesRegex(frazil.Error, name):
+                frazil.load(self.folder / folder, 2)
+        for text in ("{", "[]", '{"content": {}}'):
+            (self.folder / "out/state/base.0001.json").write_text(text)
+            with self.assertRaisesRegex(ValueError, "base.0001.json: it is damaged"):
+                frazil.load(self.folder / "out", 1)
         (self.folder / "scene.toml").write_text("[shot]\nframes = 3\n")
         with self.assertRaisesRegex(ValueError, "scene.toml: it is not the scene that a run writes"):
             frazil.Shot(self.folder)
