@@ -177,6 +177,5 @@ def load(folder: str | os.PathLike[str], number: int) -> Frame:
 
     Meshes and points are read from .usdc files or, where there are none, from .ply, .obj or .vdb, with the same result. Grids are read when
     Volume.load is called. Raises FileNotFoundError for a frame that is not made or a folder that no run made, ValueError if scene.toml or a record in
-    state/ is damaged, frazil.Error for a file that is
-    missing or damaged."""
+    state/ is damaged, frazil.Error for another file that is missing or damaged."""
     return Shot(folder).load(number)
