@@ -140,6 +140,8 @@ pub unsafe extern "C" fn frz_geometry_load(
     unsafe {
         creates(context, out, |ctx| {
             let path = Path::new(required_text(path, "path")?);
+            // The file itself is read into memory; how large its arrays are is known only then.
+            ctx.allow(&path.display().to_string(), path.metadata().map_or(0, |data| data.len()))?;
             let parts = ctx.phase("read", || match &*extension(path) {
                 "vdb" => match changes_since(path)? {
                     Some(since) => Err(Error::file(path, partial(since))),

@@ -1,5 +1,6 @@
 /* Meshes and points of files: lent arrays of every element, names of vectors, and files that are refused. */
 #include <check.h>
+#include <pthread.h>
 
 static const char *const ply =
     "ply\nformat ascii 1.0\n"
@@ -59,6 +60,36 @@ static void a_mesh_of_polygons(frz_context *ctx) {
     frz_geometry_destroy(geometry);
 }
 
+/* Any number of threads may read it. */
+static void *read_often(void *geometry) {
+    int turn;
+    for (turn = 0; turn < 20000; ++turn) {
+        frz_geometry_part part;
+        EMPTY(part);
+        WORKS(frz_geometry_get_part(geometry, 0, &part));
+        CHECK(part.array_count == 4 && array_of(geometry, 2, "ring").values.count == 5);
+    }
+    return NULL;
+}
+
+static void threads_read_at_once(frz_context *ctx) {
+    frz_geometry *geometry;
+    pthread_t threads[4];
+    int at;
+    WORKS(frz_geometry_load(ctx, "polygons.ply", &geometry));
+    for (at = 0; at < 4; ++at) CHECK(pthread_create(&threads[at], NULL, read_often, geometry) == 0);
+    for (at = 0; at < 4; ++at) CHECK(pthread_join(threads[at], NULL) == 0);
+    frz_geometry_destroy(geometry);
+}
+
+static void memory_is_limited(frz_context *ctx) {
+    frz_geometry *geometry = NULL;
+    WORKS(frz_context_set_memory_limit(ctx, 100));
+    FAILS(frz_geometry_load(ctx, "polygons.ply", &geometry), FRZ_ERROR_MEMORY, "polygons.ply");
+    CHECK(geometry == NULL);
+    WORKS(frz_context_set_memory_limit(ctx, 0));
+}
+
 static void points_have_no_faces(frz_context *ctx) {
     frz_geometry *geometry;
     frz_geometry_part part;
@@ -115,6 +146,8 @@ static void grids_are_listed(frz_context *ctx) {
 int main(void) {
     frz_context *ctx = context_on(2);
     a_mesh_of_polygons(ctx);
+    threads_read_at_once(ctx);
+    memory_is_limited(ctx);
     points_have_no_faces(ctx);
     other_files_are_refused(ctx);
     grids_are_listed(ctx);
